@@ -8,6 +8,7 @@ pub mod ask;
 pub mod coverage;
 pub mod engine;
 pub mod finding;
+mod found_wiring;
 pub mod locate;
 pub mod main_device;
 pub mod model;

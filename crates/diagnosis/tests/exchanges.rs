@@ -427,7 +427,7 @@ fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
         script.index = script.index.wrapping_add(1);
     }
     let model = script.engine.model(Network(0)).unwrap();
-    let lost = model.traffic.copies_lost.map(|tally| tally.sum);
+    let lost = Path::ALL.map(|card| model.traffic.losses.copies(card).sum);
     assert_eq!(lost, [1, 0]);
 }
 

@@ -84,7 +84,7 @@ fn scanned(planned: &[u32], found: &[u32], has_ports: bool) -> Diagnosis {
         }
         device.answers(at, None);
     }
-    model.traffic.positions_seen = found.len() as u16;
+    model.traffic.broadcasts.record_positions(found.len() as u16);
     model.now = at;
     model.touch();
     Engine::with_line(Setup { project: Some(project), ..Setup::default() }, model).diagnosis()

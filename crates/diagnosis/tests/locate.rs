@@ -8,7 +8,7 @@
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::finding::{LinkDirection, Place};
 use linesman_diagnosis::locate::{LastHop, LocateInput, Located};
-use linesman_diagnosis::model::NetworkModel;
+use linesman_diagnosis::model::{NetworkModel, Tally};
 use linesman_diagnosis::observe::{HostEvent, HostObservation};
 use linesman_diagnosis::rule::{View, frame_errors};
 use linesman_proto::address::{DeviceId, Network, Path};
@@ -243,7 +243,9 @@ fn the_last_hop_is_told_by_the_card() {
 #[test]
 fn without_the_cards_counters_the_last_hop_is_a_set() {
     let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
-    bench.model.traffic.lost.add(3, bench.now);
+    let mut lost = Tally::default();
+    lost.add(3, bench.now);
+    bench.model.traffic.losses.report(lost);
     bench.read_all();
     let conditions = bench.conditions();
     assert_eq!(conditions.len(), 1, "{conditions:?}");
@@ -264,14 +266,16 @@ fn copies_that_a_card_of_a_ring_misses_are_lost_on_its_last_hop_whatever_was_los
     let wired = [Wired { on: End::MainDevice(Path::A), entry: A }, on(1, B), on(2, B)];
     let ring = Tree::from_wiring(&wired, Some((2, B))).unwrap();
     let mut bench = Bench::new(ring, vec![(true, false); 3]);
-    bench.model.traffic.first = Some(bench.now);
+    bench.model.traffic.recording.record_frame(bench.now);
     // Two frames while the line came up; then those alone that come back to card A.
-    bench.model.traffic.lost.add(1, bench.now);
-    bench.model.traffic.lost.add(1, bench.now + Span::ms(1));
+    let mut lost = Tally::default();
+    lost.add(1, bench.now);
+    lost.add(1, bench.now + Span::ms(1));
+    bench.model.traffic.losses.report(lost);
     bench.read_all();
     bench.now += Span::s(2);
     for _ in 0..9 {
-        bench.model.traffic.copies_lost[Path::A.index()].add(1, bench.now);
+        bench.model.traffic.losses.record_copy(Path::A, bench.now);
         bench.now += Span::ms(7);
     }
     bench.read_all();

@@ -348,7 +348,7 @@ fn a_working_counter_that_recovers_between_readings_is_over() {
     let base = format!("{TWO}[[working_counter]]\nname = \"d\"\nexpected = 9\n");
     let text = [base, reading(20, 9), reading(30, 0), reading(40, 9)].concat();
     let model = ObservationFile::parse(&text).unwrap().model(None);
-    let deficit = model.cyclic[0].deficits[0];
+    let deficit = model.cyclic[0].wkc.deficits()[0];
     assert_eq!((deficit.lowest, deficit.ended.is_some()), (0, true));
 }
 

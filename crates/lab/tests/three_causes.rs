@@ -98,7 +98,7 @@ fn who_is_gone_whose_firmware_fails_and_whose_cycle_is_too_fast_are_told_apart()
     ] {
         let lab = broken(text, true);
         let line = lab.engine().model(Network(0)).unwrap();
-        let is_low = line.cyclic.iter().any(|cyclic| !cyclic.deficits.is_empty());
+        let is_low = line.cyclic.iter().any(|cyclic| !cyclic.wkc.deficits().is_empty());
         let diagnosis = lab.diagnosis();
         let said: Vec<_> =
             diagnosis.findings.iter().map(|f| (&f.code, f.cause, &f.place)).collect();

@@ -9,6 +9,7 @@
 
 pub mod controller;
 pub mod device;
+mod event_queue;
 pub mod fault;
 pub mod frame;
 pub mod hardware;

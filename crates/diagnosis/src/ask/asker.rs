@@ -380,7 +380,7 @@ impl Asker {
         (*tries, *most) = (*tries + 1, (*most).max(answered));
         let (tries, most) = (*tries, *most);
         let kind = model.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind);
-        let counted = model.traffic.broadcast_now.map(|count| count.value);
+        let counted = model.traffic.broadcasts.now().map(|count| count.value);
         let present =
             counted.unwrap_or_else(|| u16::try_from(model.device_count()).unwrap_or(u16::MAX));
         if most > 0 && most >= present {

@@ -245,8 +245,8 @@ fn answers_are_evidence_and_questions_are_no_frames_of_the_main_device() {
     bench.engine.note_asking(bench.asker.report(bench.now));
     bench.engine.finish(bench.now, true);
     let model = bench.engine.model(Network(0)).unwrap();
-    assert_eq!(model.traffic.frames, 2 * bench.cycles, "its own frames, out and back");
-    assert_eq!(model.traffic.senders.len(), 1, "no second MainDevice");
+    assert_eq!(model.traffic.recording.frames(), 2 * bench.cycles, "its own frames, out and back");
+    assert_eq!(model.traffic.requests.senders().len(), 1, "no second MainDevice");
     assert!(model.devices.iter().all(|device| device.dl.first.is_some()));
     assert!(model.devices.iter().all(|device| device.counters.is_known()));
     let diagnosis = bench.engine.diagnosis();

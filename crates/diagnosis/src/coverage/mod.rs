@@ -419,7 +419,7 @@ struct Basis<'a> {
 
 impl<'a> Basis<'a> {
     fn of(model: &'a NetworkModel, input: InputKind) -> Self {
-        let has_frames = model.traffic.frames > 0;
+        let has_frames = model.traffic.recording.frames() > 0;
         let states_read = state::all_read(model);
         let expectations_known = process_data::all_known(model);
         let counters_tell = signal::all_tell(model);

@@ -12,7 +12,7 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
     let model = basis.model;
     let traffic = &model.traffic;
     let mut all = Assessment::judged(Subject::Presence);
-    let is_counted = traffic.broadcast_answers > 0 || traffic.positions_seen > 0;
+    let is_counted = traffic.broadcasts.most() > 0 || traffic.broadcasts.positions() > 0;
     if model.device_count() == 0 {
         let text = "no SubDevice was seen to answer";
         let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
@@ -29,10 +29,10 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::InPart, gap);
     }
     let planned = model.devices.iter().filter(|one| one.planned.is_some()).count();
-    if planned > 0 && usize::from(traffic.broadcast_answers) > planned {
+    if planned > 0 && usize::from(traffic.broadcasts.most()) > planned {
         let text = format!(
             "{} SubDevices answered a broadcast, {planned} are planned",
-            traffic.broadcast_answers
+            traffic.broadcasts.most()
         );
         let gap = Gap::new(Reason::NumberUnknown, text)
             .essential()
@@ -60,23 +60,23 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::InPart, gap);
     }
     // Those of lost frames are told with these. Who brings a line up asks for what is not there.
-    let unanswered = traffic.unanswered_alone;
+    let unanswered = traffic.datagrams.unanswered_alone();
     if basis.input != InputKind::Driven && unanswered > 0 && silent.is_empty() {
         let text =
             format!("{unanswered} datagrams came back without an answer, and nothing tells why");
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
-    let now = traffic.broadcast_now.map_or(traffic.broadcast_answers, |now| now.value);
-    if now < traffic.broadcast_answers {
+    let now = traffic.broadcasts.now().map_or(traffic.broadcasts.most(), |now| now.value);
+    if now < traffic.broadcasts.most() {
         let text = format!(
             "{now} SubDevices answered the last broadcast, {} an earlier one",
-            traffic.broadcast_answers
+            traffic.broadcasts.most()
         );
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
-    if let Some(rose) = traffic.broadcast_rose.filter(|_| !model.sees_all_orders) {
+    if let Some(rose) = traffic.broadcasts.rose().filter(|_| !model.sees_all_orders) {
         let text = format!(
             "{} SubDevices answered a broadcast at first, and {} from {} on, while process data were exchanged: where the \
              others had been was not seen",

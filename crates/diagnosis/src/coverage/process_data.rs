@@ -16,35 +16,36 @@ pub(super) fn all_known(model: &NetworkModel) -> bool {
 /// Whether it was seen how a datagram came to its working counter: FMMUs that were set up for it, or a working
 /// counter that rose while SubDevices came to SAFEOP and OP.
 fn is_known(model: &NetworkModel, cyclic: &Cyclic) -> bool {
-    let has_risen = cyclic.highest.value > cyclic.first.value && !rose_unseen(model, cyclic);
-    let is_planned = cyclic.planned.is_some_and(|planned| cyclic.highest.value >= planned);
-    cyclic.highest.value > 0 && (is_planned || has_risen || model.owners(cyclic).next().is_some())
+    let has_risen = cyclic.wkc.has_risen() && !rose_unseen(model, cyclic);
+    let is_planned = cyclic.wkc.is_as_planned();
+    cyclic.wkc.highest().value > 0
+        && (is_planned || has_risen || model.owners(cyclic).next().is_some())
 }
 
 /// Tells whether a working counter rose from the first one on while nobody read a state: the line may have come up then, or
 /// was broken before.
 fn rose_unseen(model: &NetworkModel, cyclic: &Cyclic) -> bool {
-    cyclic.low_before().is_some() && model.devices.iter().all(|device| device.al.status.is_none())
+    cyclic.wkc.low_before().is_some()
+        && model.devices.iter().all(|device| device.al.status.is_none())
 }
 
 /// Assesses what is known of the working counters.
 pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
     let model = basis.model;
     let mut all = Assessment::judged(Subject::ProcessData);
-    let cyclic = || model.cyclic.iter().filter(|cyclic| cyclic.count >= FEW);
+    let cyclic = || model.cyclic.iter().filter(|cyclic| cyclic.wkc.count() >= FEW);
     if cyclic().next().is_none() {
         let text = "no process data were exchanged";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProcessData, text));
         return all;
     }
-    let unanswered: Vec<&Cyclic> = cyclic().filter(|one| one.highest.value == 0).collect();
+    let unanswered: Vec<&Cyclic> = cyclic().filter(|one| one.wkc.highest().value == 0).collect();
     if !unanswered.is_empty() {
         let text = format!("no SubDevice answered {}", names(&unanswered));
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(step());
         all.lacks(Extent::NotJudged, gap);
     }
-    let unseen: Vec<&Cyclic> =
-        cyclic().filter(|one| one.may_be_ordered.is_some_and(|at| at.at >= one.first.at)).collect();
+    let unseen: Vec<&Cyclic> = cyclic().filter(|one| one.wkc.may_be_ordered()).collect();
     if !unseen.is_empty() {
         let text = format!(
             "the working counter of {} fell when an order to leave OP may have been missed",
@@ -53,7 +54,7 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::NoBringUp, text).essential().step(step());
         all.lacks(Extent::InPart, gap);
     }
-    let is_unknown = |one: &&Cyclic| one.highest.value > 0 && !is_known(model, one);
+    let is_unknown = |one: &&Cyclic| one.wkc.highest().value > 0 && !is_known(model, one);
     let unknown: Vec<&Cyclic> = cyclic().filter(is_unknown).collect();
     if !unknown.is_empty() {
         let how = match unknown.iter().any(|one| rose_unseen(model, one)) {
@@ -79,7 +80,7 @@ fn step() -> &'static str {
 /// `LRW at 0x00010000, 7 bytes (working counter 4)`.
 fn names(all: &[&Cyclic]) -> String {
     let name = |one: &&Cyclic| {
-        format!("{} at {}, {} bytes (now {})", one.command, one.start, one.len, one.wkc.value)
+        format!("{} at {}, {} bytes (now {})", one.command, one.start, one.len, one.wkc.now().value)
     };
     let mut words: Vec<String> = all.iter().take(NAMED).map(name).collect();
     if let Some(more) = all.len().checked_sub(NAMED).filter(|more| *more > 0) {

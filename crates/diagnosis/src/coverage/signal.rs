@@ -51,7 +51,7 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
     let traffic = &model.traffic;
     let mut all = Assessment::judged(Subject::SignalQuality);
     // Frames that are spoiled are lost; enough that came back make up for counters that nobody read.
-    let frames_tell = traffic.lost.sum == 0 && traffic.damaged.sum == 0;
+    let frames_tell = traffic.losses.frames().sum == 0 && traffic.losses.damaged().sum == 0;
     let is_shown_by_frames = basis.has_frames && frames_tell;
     let Some(input) = LocateInput::of(model, true) else {
         let is_unread = model.devices.iter().all(|device| !device.counters.is_known());
@@ -108,7 +108,7 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
             path_delays(full.len())
         );
         let gap = Gap::new(Reason::CounterFull, text)
-            .essential_if(!frames_tell || traffic.returned < MANY_FRAMES)
+            .essential_if(!frames_tell || traffic.returns.count() < MANY_FRAMES)
             .at(full)
             .step("clear them and watch: `linesman counters WHERE --clear --for 60`");
         all.lacks(Extent::InPart, gap);
@@ -194,7 +194,7 @@ fn came_up(basis: &Basis<'_>, all: &mut Assessment) {
 /// A change of DL status that frames tell of and that nobody has read.
 fn unread_change(basis: &Basis<'_>, all: &mut Assessment) {
     let Some(since) = basis.model.events.dl_status.since else { return };
-    let when = match basis.model.traffic.first {
+    let when = match basis.model.traffic.recording.first() {
         Some(first) if since.at.since(first) < FROM_THE_FIRST => {
             "before the first frame that was seen".to_owned()
         }

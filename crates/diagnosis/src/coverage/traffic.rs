@@ -1,5 +1,6 @@
 //! Frames as evidence: lost frames, and the times at which frames leave and come back.
 
+use linesman_proto::address::Path;
 use linesman_proto::time::Span;
 
 use super::{Assessment, Basis, Extent, Gap, InputKind, Reason, Subject};
@@ -38,61 +39,63 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::NotJudged, gap);
     }
     // What a person typed was counted over a time of its own.
-    let is_few = basis.input != InputKind::Typed && traffic.returned < FEW_FRAMES;
+    let is_few = basis.input != InputKind::Typed && traffic.returns.count() < FEW_FRAMES;
     if is_few {
-        let text = format!("{} frames came back: too few to judge a line by", traffic.returned);
+        let text =
+            format!("{} frames came back: too few to judge a line by", traffic.returns.count());
         let gap = Gap::new(Reason::TooFewFrames, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
-    if traffic.datagrams_cut > 0 {
+    if traffic.recording.cut() > 0 {
         let text = format!(
             "{} of {} frames were recorded without their end: working counters and data behind it are missing",
-            traffic.datagrams_cut, traffic.frames
+            traffic.recording.cut(),
+            traffic.recording.frames()
         );
-        let is_much = traffic.datagrams_cut * 100 >= traffic.frames * CUT_PERCENT;
+        let is_much = traffic.recording.cut() * 100 >= traffic.recording.frames() * CUT_PERCENT;
         let gap = Gap::new(Reason::FramesCut, text)
             .essential_if(is_much)
             .step("record whole frames: `tcpdump -s 0`, no snap length");
         all.lacks(Extent::InPart, gap);
     }
-    if traffic.missed > 0 {
+    if traffic.recording.missed() > 0 {
         let text = format!(
             "the diagnosis did not keep up and missed {} of {} frames",
-            traffic.missed,
-            traffic.frames + traffic.missed
+            traffic.recording.missed(),
+            traffic.recording.frames() + traffic.recording.missed()
         );
         let gap = Gap::new(Reason::FramesMissed, text).essential().step(
             "end other programs on this computer, or record the line and judge the recording: `--record`",
         );
         all.lacks(Extent::InPart, gap);
     }
-    let lost = traffic.lost.sum;
+    let lost = traffic.losses.frames().sum;
     if lost > 0 {
         let frames = if lost == 1 { "frame" } else { "frames" };
         let text = format!("{lost} {frames} did not come back, and nothing tells where");
-        let is_much = lost.saturating_mul(RARE) > traffic.returned;
+        let is_much = lost.saturating_mul(RARE) > traffic.returns.count();
         let gap = Gap::new(Reason::FramesLost, text).essential_if(is_much).step(
             "read the counters of the MainDevice's card (`ethtool -S`) and the error counters of the SubDevices",
         );
         all.lacks(Extent::InPart, gap);
     }
-    if traffic.doubled >= FEW_DOUBLED {
-        let text = format!("{} frames came back a second time", traffic.doubled);
+    if traffic.returns.doubled() >= FEW_DOUBLED {
+        let text = format!("{} frames came back a second time", traffic.returns.doubled());
         let gap = Gap::new(Reason::FramesDoubled, text).essential().step(
             "look for what sends frames on a second time: a bridge or a mirror port on this computer, a switch, a loop",
         );
         all.lacks(Extent::InPart, gap);
     }
-    let copies = traffic.copies_lost[0].sum + traffic.copies_lost[1].sum;
+    let copies = traffic.losses.copies(Path::A).sum + traffic.losses.copies(Path::B).sum;
     if copies > 0 {
         let text = format!("of {copies} frames the copy of one card alone came back");
-        let is_much = copies.saturating_mul(RARE) > traffic.returned;
+        let is_much = copies.saturating_mul(RARE) > traffic.returns.count();
         let gap = Gap::new(Reason::FramesLost, text).essential_if(is_much).step(
             "record both cards of the ring, each as an interface of its own, and read the error counters of the SubDevices",
         );
         all.lacks(Extent::InPart, gap);
     }
-    let swallowed: u64 = traffic.swallowed.iter().map(|one| one.frames).sum();
+    let swallowed: u64 = traffic.losses.swallowed().iter().map(|one| one.frames).sum();
     if basis.input != InputKind::Driven && swallowed > copies {
         let text = format!(
             "of {swallowed} frames in the ring what came back had been processed by nobody, and the other copy did not come"
@@ -102,7 +105,7 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         );
         all.lacks(Extent::InPart, gap);
     }
-    if traffic.copies_gone.sum > 0 {
+    if traffic.losses.copies_gone().sum > 0 {
         let text = "both copies of a frame came back through the ring, and later one alone";
         let gap = Gap::new(Reason::FramesLost, text).essential().step(
             "read DL status (0x0110) and the error counters of all SubDevices: something swallows what one card sends",
@@ -126,15 +129,17 @@ pub(super) fn timing(basis: &Basis<'_>) -> Assessment {
         let text = "no process data were seen in a cycle";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProcessData, text));
     }
-    if traffic.clock_back > CLOCK_NOISE {
-        let text =
-            format!("the clock of the recording runs backwards, by {} at most", traffic.clock_back);
+    if traffic.recording.clock_back() > CLOCK_NOISE {
+        let text = format!(
+            "the clock of the recording runs backwards, by {} at most",
+            traffic.recording.clock_back()
+        );
         let gap = Gap::new(Reason::ClockJumpsBack, text)
             .step("record with one clock, and do not join recordings");
         all.lacks(Extent::InPart, gap);
     }
-    if traffic.longest_gap >= LONG_GAP {
-        let text = format!("no frame was seen for {} in between", traffic.longest_gap);
+    if traffic.recording.longest_gap() >= LONG_GAP {
+        let text = format!("no frame was seen for {} in between", traffic.recording.longest_gap());
         all.lacks(Extent::InPart, Gap::new(Reason::LongGap, text));
     }
     all

@@ -72,15 +72,19 @@ struct FrameMark {
 
 impl FrameMark {
     const fn of(model: &NetworkModel, at: Instant) -> Self {
-        Self { at, sent: model.traffic.sent, processed: model.traffic.processed }
+        Self {
+            at,
+            sent: model.traffic.requests.sent(),
+            processed: model.traffic.returns.processed(),
+        }
     }
 
     /// How many requests were sent since, and how many frames came back, processed; `None` while these are too
     /// few to tell.
     fn since(&self, model: &NetworkModel, now: Instant) -> Option<(u64, u64)> {
-        let sent = model.traffic.sent - self.sent;
+        let sent = model.traffic.requests.sent() - self.sent;
         let is_enough = sent >= SEVERAL && now >= self.at + ROUND;
-        is_enough.then(|| (sent, model.traffic.processed - self.processed))
+        is_enough.then(|| (sent, model.traffic.returns.processed() - self.processed))
     }
 }
 
@@ -92,7 +96,7 @@ impl Bisect {
     /// Begins a search, if the line has gone silent though the card has a link, and enough is known of it.
     pub(super) fn begin(model: &mut NetworkModel, now: Instant) -> Option<Self> {
         let traffic = &model.traffic;
-        let latest = [traffic.silences.back(), traffic.swallowed.back()];
+        let latest = [traffic.losses.silences().back(), traffic.losses.swallowed().back()];
         let silence = latest.into_iter().flatten().find(|silence| silence.ended.is_none())?;
         let since = silence.since;
         let card = model.host.card(linesman_proto::address::Path::A);
@@ -100,7 +104,11 @@ impl Bisect {
         let tree = model.tree.as_ref()?;
         let was_searched =
             model.hole.and_then(|hole| hole.ended).is_some_and(|ended| since.at < ended + AGAIN);
-        if now < since.at + SILENT || !has_link || was_searched || model.traffic.answered == 0 {
+        if now < since.at + SILENT
+            || !has_link
+            || was_searched
+            || model.traffic.datagrams.answered() == 0
+        {
             return None;
         }
         let left: Vec<usize> = (0..tree.links().len()).collect();
@@ -112,7 +120,7 @@ impl Bisect {
 
     /// Goes on. Gives what is to be written next; the search is over when the line says so.
     pub(super) fn go_on(&mut self, model: &mut NetworkModel, now: Instant) -> Option<Probe> {
-        let came_back = model.traffic.latest_processed;
+        let came_back = model.traffic.returns.latest_processed();
         match self.step {
             SearchStep::Closed(link, at) if came_back.is_some_and(|back| back > at) => {
                 self.step = SearchStep::Helps(link, FrameMark::of(model, now));

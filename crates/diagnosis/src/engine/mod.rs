@@ -126,7 +126,7 @@ impl Engine {
         let NetworkWatch { model, pairing, questions, .. } = self.watched(network);
         pairing.forget();
         questions.forget();
-        model.traffic.record_missed(count);
+        model.traffic.recording.record_missed(count);
         // The time to the next one says nothing.
         for cyclic in &mut model.cyclic {
             cyclic.sent.skip();
@@ -416,11 +416,11 @@ impl Engine {
         NetworkReport {
             devices: sum(|model| model.device_count() as u64),
             al_state_highest: highest.map(|state| state.name().to_owned()),
-            datagrams: sum(|model| model.traffic.datagrams),
-            unanswered: sum(|model| model.traffic.unanswered),
-            frames: sum(|model| model.traffic.frames),
-            lost: sum(|model| model.traffic.lost.sum),
-            damaged: sum(|model| model.traffic.damaged.sum),
+            datagrams: sum(|model| model.traffic.datagrams.judged()),
+            unanswered: sum(|model| model.traffic.datagrams.unanswered()),
+            frames: sum(|model| model.traffic.recording.frames()),
+            lost: sum(|model| model.traffic.losses.frames().sum),
+            damaged: sum(|model| model.traffic.losses.damaged().sum),
         }
     }
 }

@@ -99,7 +99,7 @@ impl NetworkWatch {
         let is_recent = |at: Option<Instant>| at.is_some_and(|at| now < at + WATCHED_AFTER_LOSS);
         is_open
             || self.model.devices.iter().any(|device| device.mailbox.is_open())
-            || is_recent(self.model.traffic.lost.last)
+            || is_recent(self.model.traffic.losses.frames().last)
             || self.model.devices.iter().any(|device| {
                 device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
             })
@@ -107,8 +107,8 @@ impl NetworkWatch {
 
     /// Whether nothing comes back at the moment.
     pub(super) fn is_silent(&self) -> bool {
-        let latest = self.model.traffic.silences.back();
-        let swallowed = self.model.traffic.swallowed.back();
+        let latest = self.model.traffic.losses.silences().back();
+        let swallowed = self.model.traffic.losses.swallowed().back();
         let lasts = |silence: &Silence| silence.ended.is_none() && silence.frames >= FEW_LOST;
         latest.is_some_and(lasts) || swallowed.is_some_and(lasts) || self.bisect.is_some()
     }
@@ -146,7 +146,8 @@ impl NetworkWatch {
 
     /// What makes it worth asking: frames lost, and working counters that fell.
     pub(super) fn alarms(&self) -> (u64, u64) {
-        let deficits = self.model.cyclic.iter().map(|cyclic| cyclic.deficits.len() as u64).sum();
-        (self.model.traffic.lost.times, deficits)
+        let deficits =
+            self.model.cyclic.iter().map(|cyclic| cyclic.wkc.deficits().len() as u64).sum();
+        (self.model.traffic.losses.frames().times, deficits)
     }
 }

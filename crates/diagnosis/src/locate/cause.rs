@@ -8,8 +8,7 @@
 //! | symbols in one direction, again and again | the sender's output or the receiver's input |
 //! | symbols in one direction, a few | the cable, or anything else |
 //!
-//! References: HW-26, HW-27 and the table of `facts/esc.md` 3.4. The numbers are judgement, not
-//! measurement; they add up to less than 1, since there are other causes in the world.
+//! The numbers for one link by itself are in `cause_weights`.
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::Path;
@@ -18,6 +17,7 @@ use linesman_proto::time::Instant;
 use linesman_proto::topology::route::Direction;
 use linesman_proto::topology::{End, Hop};
 
+use super::cause_weights::{CauseSeat, LinkSymptom};
 use super::damage::{Damage, LastHop, Located};
 use super::input::LocateInput;
 use super::rhythm::{falls_together, is_steady};
@@ -324,114 +324,76 @@ fn shared(group: &Group, common: Option<(usize, FaultName)>) -> Vec<Suspect> {
 
 /// One link, or the last hop, by itself.
 fn single(input: &LocateInput<'_>, group: &Group) -> Vec<Suspect> {
-    use FaultName::{
-        CableDegraded, DeviceInternal, EmcNoise, HostDrops, NicDamaged, ReceiverDamaged,
-        TransmitterDamaged,
-    };
     let spot = link_spot(group);
     let hop = group.damages.first().map(|damage| damage.hop);
     let Some(hop) = hop.or_else(|| group.last_hop.as_ref().map(LastHop::hop)) else {
         return Vec::new();
     };
-    let hits: u64 = group.damages.iter().map(|d| d.frames.max(d.symbols.unwrap_or(0))).sum::<u64>();
-    let is_unread = group.damages.iter().all(|damage| damage.symbols.is_none());
-    let is_all_clean = !group.damages.is_empty() && group.damages.iter().all(is_clean);
     let is_both = matches!(spot, CausePlace::Link(_, None));
-    let at_card = [hop.from, hop.to].into_iter().any(|end| end.node().is_none());
-
-    let weights: Vec<(FaultName, f64)> = match (&group.last_hop, is_both) {
-        (Some(LastHop::Unknown { .. }), _) => {
-            let mut list = vec![
-                suspect(CableDegraded, spot, 0.25),
-                suspect(NicDamaged, CausePlace::Host, 0.2),
-                suspect(HostDrops, CausePlace::Host, 0.2),
-                suspect(TransmitterDamaged, spot, 0.1),
-            ];
-            if let Some(node) = hop.from.node() {
-                list.push(suspect(DeviceInternal, CausePlace::Device(node), 0.1));
-            }
-            list.push(suspect(EmcNoise, spot, 0.1));
-            return list;
-        }
-        (Some(LastHop::Damaged { .. }), false) => {
-            let mut list = vec![
-                suspect(CableDegraded, spot, 0.35),
-                suspect(NicDamaged, CausePlace::Host, 0.2),
-                suspect(TransmitterDamaged, spot, 0.15),
-            ];
-            if let Some(node) = hop.from.node() {
-                list.push(suspect(DeviceInternal, CausePlace::Device(node), 0.15));
-            }
-            list.push(suspect(EmcNoise, spot, 0.1));
-            return list;
-        }
-        (_, false) if is_all_clean && at_card => {
-            // Clean symbols, bad frames, and the sender is the card.
-            return vec![
-                suspect(NicDamaged, CausePlace::Host, 0.75),
-                suspect(CableDegraded, spot, 0.1),
-                suspect(ReceiverDamaged, spot, 0.05),
-            ];
-        }
-        (_, true) => vec![
-            (CableDegraded, 0.6),
-            (EmcNoise, 0.25),
-            (TransmitterDamaged, 0.05),
-            (ReceiverDamaged, 0.05),
-        ],
-        (None, false) if at_card => vec![
-            // The first cable, with an end that no controller knows.
-            (CableDegraded, 0.4),
-            (TransmitterDamaged, 0.25),
-            (EmcNoise, 0.15),
-            (ReceiverDamaged, 0.1),
-        ],
-        (None, false)
-            if hits >= MANY && is_steady(input, &group.damages) && other_way_counts(input, hop) =>
-        {
-            vec![
-                (TransmitterDamaged, 0.35),
-                (ReceiverDamaged, 0.25),
-                (CableDegraded, 0.2),
-                (EmcNoise, 0.1),
-            ]
-        }
-        (None, false) if hits >= MANY => vec![
-            (CableDegraded, 0.35),
-            (EmcNoise, 0.25),
-            (TransmitterDamaged, 0.2),
-            (ReceiverDamaged, 0.1),
-        ],
-        (None, false) => vec![
-            (CableDegraded, 0.45),
-            (EmcNoise, 0.2),
-            (TransmitterDamaged, 0.15),
-            (ReceiverDamaged, 0.1),
-        ],
-    };
+    let symptom = symptom(input, group, hop, is_both);
+    let is_unread =
+        !symptom.is_complete() && group.damages.iter().all(|damage| damage.symbols.is_none());
     let share = if is_unread { 0.8 } else { 1.0 };
+    let weights = symptom.weights().iter();
     let mut list: Vec<Suspect> = weights
-        .into_iter()
-        .map(|(cause, weight)| match (cause, hop.from, hop.to) {
-            // The output stage of the card is a part of the host, and so is its input stage.
-            (TransmitterDamaged, End::MainDevice(_), _)
-            | (ReceiverDamaged, _, End::MainDevice(_)) => {
-                suspect(NicDamaged, CausePlace::Host, weight * share)
-            }
-            _ => suspect(cause, spot, weight * share),
+        .filter_map(|(cause, seat, weight)| {
+            let (cause, spot) = seated(*cause, *seat, spot, hop)?;
+            Some(suspect(cause, spot, weight * share))
         })
         .collect();
+    if symptom.is_complete() {
+        return list;
+    }
     if is_unread {
         let sender = hop.from.node().map_or(CausePlace::Host, CausePlace::Device);
-        list.push(suspect(DeviceInternal, sender, 0.1));
+        list.push(suspect(FaultName::DeviceInternal, sender, 0.1));
     } else if !is_both && let Some(node) = hop.from.node() {
         // Controllers in programmable logic make a symbol error of a frame that was bad before.
-        list.push(suspect(DeviceInternal, CausePlace::Device(node), 0.04));
+        list.push(suspect(FaultName::DeviceInternal, CausePlace::Device(node), 0.04));
     }
     if let Some(damage) = group.damages.first() {
         add_earlier(&mut list, damage);
     }
     list
+}
+
+/// What is seen of one link; `is_both` if in both directions.
+fn symptom(input: &LocateInput<'_>, group: &Group, hop: Hop, is_both: bool) -> LinkSymptom {
+    let hits: u64 = group.damages.iter().map(|d| d.frames.max(d.symbols.unwrap_or(0))).sum::<u64>();
+    let is_all_clean = !group.damages.is_empty() && group.damages.iter().all(is_clean);
+    let at_card = [hop.from, hop.to].into_iter().any(|end| end.node().is_none());
+    match (&group.last_hop, is_both) {
+        (Some(LastHop::Unknown { .. }), _) => LinkSymptom::LastHopUnread,
+        (_, true) => LinkSymptom::BothDirections,
+        (Some(LastHop::Damaged { .. }), false) => LinkSymptom::LastHopDamaged,
+        (None, false) if is_all_clean && at_card => LinkSymptom::CleanFromCard,
+        (None, false) if at_card => LinkSymptom::OneDirectionAtCard,
+        (None, false) if hits < MANY => LinkSymptom::OneDirectionFew,
+        (None, false) if is_steady(input, &group.damages) && other_way_counts(input, hop) => {
+            LinkSymptom::OneDirectionSteady
+        }
+        (None, false) => LinkSymptom::OneDirectionMany,
+    }
+}
+
+/// A cause and its place; `None` for one inside a controller where the card is.
+fn seated(
+    cause: FaultName,
+    seat: CauseSeat,
+    link: CausePlace,
+    hop: Hop,
+) -> Option<(FaultName, CausePlace)> {
+    let stage = |end: End| match end {
+        End::MainDevice(_) => (FaultName::NicDamaged, CausePlace::Host),
+        End::Controller(..) => (cause, link),
+    };
+    match seat {
+        CauseSeat::Link => Some((cause, link)),
+        CauseSeat::Output => Some(stage(hop.from)),
+        CauseSeat::Input => Some(stage(hop.to)),
+        CauseSeat::Sender => hop.from.node().map(|node| (cause, CausePlace::Device(node))),
+        CauseSeat::Host => Some((cause, CausePlace::Host)),
+    }
 }
 
 /// Whether the other direction of a link could tell of symbols, so that their absence says something.

@@ -376,7 +376,7 @@ impl ErrorWalk<'_, '_> {
         let (first, last) = (errors.first_of_spell?, errors.last?);
         // At the end of the input no reading comes any more. If nothing came back at last, the
         // counters could not even be asked, and their silence says nothing.
-        let silences = &self.input.model().traffic.silences;
+        let silences = &self.input.model().traffic.losses.silences();
         let is_silent = silences.back().is_some_and(|silence| silence.ended.is_none());
         let may_judge = self.input.has_ended() && !is_silent;
         let read_since = |at: Instant| may_judge || self.horizon > at;
@@ -407,19 +407,20 @@ impl ErrorWalk<'_, '_> {
         let hop = *route.hops().last()?;
         let model = self.input.model();
         // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
-        let copies = model.traffic.copies_lost[card.index()];
-        let whole = model.traffic.lost;
+        let copies = model.traffic.losses.copies(card);
+        let whole = model.traffic.losses.frames();
         let lost = if copies.of_spell() > whole.of_spell() { copies } else { whole };
         let (first, last) = (lost.first_of_spell?, lost.last?);
         let is_silent = self.carried.frames == 0 && !model.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.
         let is_read = self.is_read && self.horizon >= first;
-        let is_first = model.traffic.first.is_some_and(|begin| last < begin + COMING_UP);
+        let is_first =
+            model.traffic.recording.first().is_some_and(|begin| last < begin + COMING_UP);
         // Somebody who looks for the place where all of them vanish does so in a silence, not in noise.
         let was_searched =
             model.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
-        let is_cut = model.traffic.datagrams_cut > 0;
-        let is_unrecorded = model.traffic.was_badly_recorded(first, last);
+        let is_cut = model.traffic.recording.cut() > 0;
+        let is_unrecorded = model.traffic.recording.was_bad(first, last);
         let is_explained = is_unrecorded
             || is_cut
             || is_first

@@ -8,6 +8,7 @@
 //! References: S1 14 (error counters); how to find an error, `REQUIREMENTS` HW-18, HW-22 to HW-28.
 
 pub mod cause;
+mod cause_weights;
 pub mod cut_distance;
 pub mod damage;
 pub mod input;

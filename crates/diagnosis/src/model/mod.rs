@@ -21,6 +21,7 @@ pub mod round_trip;
 pub mod search;
 pub mod sii_image;
 pub mod traffic;
+pub mod working_counter;
 
 use std::collections::VecDeque;
 
@@ -39,7 +40,7 @@ pub use al_history::{AlChange, AlError, AlHistory, StateRequest};
 pub use clock::{ClockHistory, Reference};
 pub use counters::{CounterHistory, CounterTrack, Rise};
 pub use cycle_timing::{CycleDeviation, CycleTiming, Pause};
-pub use cyclic::{Cyclic, Deficit, Ordered, Owner};
+pub use cyclic::{Cyclic, Owner};
 pub use device::{Absence, Chip, Device, Planned, SeenIdentity, SharedAddress, SharedBy, Trouble};
 pub use dl_history::{DlChange, DlHistory};
 pub use event_field::{EventField, EventTrack};
@@ -50,7 +51,8 @@ pub use reported::{Counting, ErrorSum, Reported, ReportedTrouble};
 pub use round_trip::RoundTripTimes;
 pub use search::LoopWrite;
 pub use sii_image::{Power, SiiImage};
-pub use traffic::{CountRise, Silence, Traffic};
+pub use traffic::{Silence, Traffic};
+pub use working_counter::{Deficit, Ordered, WorkingCounterHistory};
 
 /// How many changes of one kind are kept of a controller; older ones are forgotten.
 pub const CHANGES_KEPT: usize = 64;
@@ -217,8 +219,7 @@ impl NetworkModel {
                 device.counters.begin_spell();
             }
             self.host.begin_spell();
-            self.traffic.lost.begin_spell();
-            self.traffic.copies_lost.iter_mut().for_each(Tally::begin_spell);
+            self.traffic.losses.begin_spell();
         }
         self.last_errors = self.last_errors.max(Some(at));
     }
@@ -289,14 +290,14 @@ impl NetworkModel {
     pub fn device_count(&self) -> usize {
         let answered = self.devices.iter().filter(|device| device.answered.is_some()).count();
         let traffic = &self.traffic;
-        answered.max(usize::from(traffic.broadcast_answers.max(traffic.positions_seen)))
+        answered.max(usize::from(traffic.broadcasts.counted()))
     }
 
     /// The highest state that any controller was ever seen in.
     #[must_use]
     pub fn highest_state(&self) -> Option<AlState> {
         let states = self.devices.iter().map(|device| device.al.highest);
-        states.max().flatten().max(self.traffic.al_highest)
+        states.max().flatten().max(self.traffic.broadcasts.al_highest())
     }
 
     /// The MainDevice that drives the line: by its habits, or whose tools have told of the line.
@@ -309,7 +310,7 @@ impl NetworkModel {
     /// frames tells: before that links come as the line is brought up.
     #[must_use]
     pub fn changed_link(&self) -> Option<Seen<()>> {
-        let is_running = |at: Instant| self.cyclic.iter().any(|cyclic| cyclic.first.at < at);
+        let is_running = |at: Instant| self.cyclic.iter().any(|cyclic| cyclic.wkc.first().at < at);
         self.events.dl_status.came.filter(|came| is_running(came.at))
     }
 
@@ -317,7 +318,7 @@ impl NetworkModel {
     pub fn quiet(&self) -> impl Iterator<Item = Pause> + '_ {
         let cycle = self.cyclic.iter().filter_map(|cyclic| cyclic.sent.cycle()).min();
         let is_long = move |pause: &Pause| cycle.is_some_and(|cycle| pause.span() >= cycle * 3);
-        self.traffic.quiet.iter().rev().copied().filter(is_long)
+        self.traffic.recording.quiet().iter().rev().copied().filter(is_long)
     }
 
     /// When no frame at all was seen before those, or between those, that a silence consists of.

@@ -77,7 +77,7 @@ pub fn seen(model: &NetworkModel) -> Option<(HoleSearch, Vec<usize>)> {
     writes.dedup_by_key(|write| (write.device, write.closed));
     let begin = writes.iter().find(|write| write.closed.is_some())?.seen.at;
     let traffic = &model.traffic;
-    let silences = || traffic.silences.iter().chain(&traffic.swallowed);
+    let silences = || traffic.losses.silences().iter().chain(traffic.losses.swallowed());
     let is_on = |silence: &&Silence| {
         silence.since.at <= begin && silence.ended.is_none_or(|ended| ended > begin)
     };
@@ -141,7 +141,7 @@ fn link_below(tree: &Tree, device: DeviceId, port: Port) -> Option<usize> {
 #[must_use]
 pub fn began_at_once(model: &NetworkModel, (from, to): (Instant, Instant)) -> bool {
     let ended = |silence: &Silence| silence.ended.unwrap_or(Instant::MAX);
-    let mut silences = model.traffic.silences.iter().rev();
+    let mut silences = model.traffic.losses.silences().iter().rev();
     let about = silences.find(|silence| silence.since.at <= to && ended(silence) >= from);
     about.is_some_and(|silence| {
         // Before it nothing may have been sent: in a recording without a link nothing is.

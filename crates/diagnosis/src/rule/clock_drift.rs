@@ -96,7 +96,7 @@ fn was_silent(device: &Device, astray: &ClockDeviation) -> bool {
 /// Whether no frame came round meanwhile, or none with the time of the reference, or the ring was in halves, so
 /// that nobody was steered, and the clock went off by no more than a sound quartz does in such a time.
 fn was_left_alone(model: &NetworkModel, astray: &ClockDeviation) -> bool {
-    let silent = model.traffic.silences.iter().map(|silence| {
+    let silent = model.traffic.losses.silences().iter().map(|silence| {
         let ended = silence.ended.unwrap_or(model.now).min(astray.far.at);
         ended.since(silence.since.at.max(astray.near.at).min(ended)).as_nanos()
     });
@@ -113,7 +113,7 @@ fn was_left_alone(model: &NetworkModel, astray: &ClockDeviation) -> bool {
         return true;
     }
     let is_in_halves =
-        model.traffic.broadcast_split.is_some_and(|split| split.at >= astray.near.at);
+        model.traffic.broadcasts.split().is_some_and(|split| split.at >= astray.near.at);
     if is_in_halves && astray.ppm.unsigned_abs() <= Reference::SOUND.unsigned_abs() {
         return true;
     }

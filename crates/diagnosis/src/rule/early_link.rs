@@ -77,7 +77,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 
 /// Silences that are over, long enough to be no accident.
 fn silences(model: &NetworkModel) -> impl Iterator<Item = (&Silence, Instant)> {
-    let over = model.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
+    let over =
+        model.traffic.losses.silences().iter().rev().filter_map(|one| Some((one, one.ended?)));
     over.filter(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= BLIND)
 }
 

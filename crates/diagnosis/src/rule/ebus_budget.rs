@@ -22,6 +22,7 @@ use linesman_proto::register::table;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
+use crate::found_wiring;
 use crate::model::{Device, NetworkModel, Power, Seen};
 
 /// The page.
@@ -46,8 +47,11 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     if !model.devices.iter().any(feeds) {
         return;
     }
-    let is_whole = usize::from(model.traffic.positions_seen) >= tree.len();
-    if !is_whole || !model.devices.iter().all(is_as_planned) || super::wiring::judges(model) {
+    let is_whole = usize::from(model.traffic.broadcasts.positions()) >= tree.len();
+    if !is_whole
+        || !model.devices.iter().all(is_as_planned)
+        || found_wiring::is_wired_otherwise(model)
+    {
         // Whoever is wired otherwise than planned is fed otherwise, too: first things first.
         return;
     }

@@ -49,7 +49,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         // Counters of ports say more.
         let sum = device.error_sum.filter(|sum| sum.rise > 0 && !device.counters.is_known());
         let sum = sum.map(|sum| (sum, "damaged frames"));
-        let is_placed = is_placed || model.traffic.frames > 0;
+        let is_placed = is_placed || model.traffic.recording.frames() > 0;
         let (sum, what) = sum.or_else(|| unplaced(device).filter(|_| !is_placed))?;
         Some((device, sum, what))
     });

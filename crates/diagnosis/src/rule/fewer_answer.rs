@@ -54,7 +54,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     conditions.extend(seen(view, conditions));
     // Without a link nobody answers; where the wiring is known, the link itself is told.
     let carrier = model.host.card(Path::A).carrier.filter(|carrier| !carrier.value);
-    let unlinked = carrier.filter(|_| model.devices.is_empty() && model.traffic.frames == 0);
+    let unlinked =
+        carrier.filter(|_| model.devices.is_empty() && model.traffic.recording.frames() == 0);
     let told = reported.answering.or_else(|| Some(Seen::new(0, unlinked?.at, None)));
     let Some(answering) = told else { return };
     let known = model.devices.len().max(usize::from(reported.answering_most));
@@ -141,12 +142,11 @@ fn is_chain(tree: &Tree) -> bool {
 fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let model = view.model;
     let traffic = &model.traffic;
-    let now = traffic.broadcast_now.filter(|_| traffic.frames > 0)?;
-    let most = traffic.broadcast_answers;
+    let now = traffic.broadcasts.now().filter(|_| traffic.recording.frames() > 0)?;
+    let most = traffic.broadcasts.most();
     let lasts = view.has_ended || view.now.since(now.at) >= LASTS;
     // In a ring each card counts its own half; without any answer another rule tells.
-    let is_ring = traffic.was_processed_by_one
-        || traffic.broadcast_split.is_some()
+    let is_ring = traffic.broadcasts.came_in_copies()
         || model.tree.as_ref().is_some_and(|tree| tree.closes_at().is_some());
     let is_ordered = model.loops_ordered.is_some_and(|ordered| ordered >= now.at.before(ORDERED));
     if now.value == 0 || now.value >= most || !lasts || is_ring || is_ordered {

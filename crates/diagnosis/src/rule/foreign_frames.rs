@@ -45,12 +45,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let traffic = &model.traffic;
     let destroyed = destroyed(model);
     let counted = |rises: &[&Rise]| -> u64 { rises.iter().map(|rise| rise.difference.rise).sum() };
-    let seen = traffic.first_foreign;
+    let seen = traffic.foreign.first();
     let firsts =
         destroyed.iter().filter_map(|(_, rises)| rises.first().map(|rise| rise.after_time));
     let lasts = destroyed.iter().filter_map(|(_, rises)| rises.last().map(|rise| rise.at));
     let Some(first) = firsts.chain(seen.map(|seen| seen.at)).min() else { return };
-    let last = lasts.chain(traffic.latest_foreign).max().unwrap_or(first);
+    let last = lasts.chain(traffic.foreign.latest()).max().unwrap_or(first);
     let place = Place::Network { network: model.network };
     let mut condition = Condition::new(&PAGE, place, FaultName::ForeignFrames, first)
         .confidence(if seen.is_some() { 0.9 } else { 0.7 })
@@ -59,7 +59,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         condition = condition.or(FaultName::SecondMainDevice, 0.1);
     }
     if let Some(seen) = seen {
-        let (count, kind) = (traffic.foreign, name(seen.value));
+        let (count, kind) = (traffic.foreign.count(), name(seen.value));
         let text = format!("{count} frames that are not EtherCAT, the first of them {kind}");
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
     }
@@ -73,7 +73,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let address = ErrorCounter::ProcessingUnit.address();
         condition = condition.shown_by(Evidence::rise(device.id, address, None, rise, text));
     }
-    if destroyed.is_empty() && traffic.foreign_received == 0 {
+    if destroyed.is_empty() && traffic.foreign.received() == 0 {
         // Recorded beside the line, or sent by this computer itself: nobody says that it came in.
         condition.severity = Severity::Info;
     }

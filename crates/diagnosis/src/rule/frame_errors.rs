@@ -128,7 +128,8 @@ fn add(
     }
     // A full counter does not show whether it goes on; frames that are still missing do.
     let is_full = suspicion.damages.iter().any(|damage| damage.is_lower_bound);
-    let latest_lost = view.model.traffic.latest_lost.filter(|_| is_full && suspicion.frames() > 0);
+    let latest_lost =
+        view.model.traffic.losses.latest().filter(|_| is_full && suspicion.frames() > 0);
     let last = latest_lost.map_or(last, |lost| last.max(lost.at));
     if last + QUIET < view.model.now {
         condition = condition.ended(last);

@@ -67,7 +67,7 @@ struct Missing {
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let model = view.model;
-    if model.traffic.frames > 0 {
+    if model.traffic.recording.frames() > 0 {
         conditions.extend(seen(view, conditions));
         return;
     }
@@ -101,20 +101,23 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let model = view.model;
     let traffic = &model.traffic;
     // In a ring one copy may be lost alone.
-    let tallies = [traffic.lost, traffic.copies_lost[0], traffic.copies_lost[1]];
+    let tallies =
+        [traffic.losses.frames(), traffic.losses.copies(Path::A), traffic.losses.copies(Path::B)];
     let first = tallies.iter().filter_map(|tally| tally.first).min()?;
     let last = tallies.iter().filter_map(|tally| tally.last).max()?;
     let count: u64 = tallies.iter().map(|tally| tally.sum).sum();
     // A recorder that misses requests misses returns, too.
-    let is_recorder = traffic.unrecorded.sum > 0 || traffic.datagrams_cut > 0 || traffic.missed > 0;
+    let is_recorder = traffic.recording.has_gaps()
+        || traffic.recording.cut() > 0
+        || traffic.recording.missed() > 0;
     // What is lost in a row is another rule's; of those that are still missing it is not known whether they are the
     // first of many.
-    let in_a_row = traffic.silences.iter().filter(|one| {
+    let in_a_row = traffic.losses.silences().iter().filter(|one| {
         let is_open = one.ended.is_none() && !view.has_ended;
         is_open || one.frames >= nobody_answers::CERTAIN
     });
     let single = count.saturating_sub(in_a_row.map(|one| one.frames).sum());
-    let went_on = traffic.latest_returned.is_some_and(|returned| returned.at > first);
+    let went_on = traffic.returns.latest().is_some_and(|returned| returned.at > first);
     if single == 0 || !went_on || model.sees_all_orders || traffic.is_one_sided() || is_recorder {
         return None;
     }
@@ -136,25 +139,26 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     let damaged = model.host.is_watched.then_some(model.host.card(Path::A).crc.sum);
     // Many cards count no damaged frame at all: none counted proves nothing.
     let condition = causes(view, damaged.unwrap_or(0), false, first);
-    let what = if traffic.lost.sum == 0 { "copies of frames in the ring" } else { "frames" };
+    let what =
+        if traffic.losses.frames().sum == 0 { "copies of frames in the ring" } else { "frames" };
     let text = match count {
-        1 => format!("one of {} {what} did not come back, at {last}", traffic.sent),
+        1 => format!("one of {} {what} did not come back, at {last}", traffic.requests.sent()),
         _ => format!(
             "{count} of {} {what} did not come back, single ones or a few in a row, the last at {last}",
-            traffic.sent
+            traffic.requests.sent()
         ),
     };
-    let known = traffic.first_lost.and_then(|seen| seen.frame).unwrap_or(0);
+    let known = traffic.losses.first().and_then(|seen| seen.frame).unwrap_or(0);
     let hurt: Vec<DeviceId> = out_of_step(model).collect();
     let follows = |id: &DeviceId| [Symptom::StateLost(*id), Symptom::WorkingCounter(*id)];
     let mut condition = condition
         .confirmed(last)
         .explaining([Symptom::FramesLost])
         .explaining(hurt.iter().flat_map(follows));
-    let is_rare = count.saturating_mul(RARE) <= traffic.sent;
+    let is_rare = count.saturating_mul(RARE) <= traffic.requests.sent();
     condition.severity = if !hurt.is_empty() {
         Severity::Error
-    } else if is_rare || single < SEVERAL || traffic.lost.sum == 0 {
+    } else if is_rare || single < SEVERAL || traffic.losses.frames().sum == 0 {
         // A ring that lost one copy has lost nothing.
         Severity::Info
     } else {
@@ -180,7 +184,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
 
 /// SubDevices that lost their step with the frames after some frames got lost.
 fn out_of_step(model: &NetworkModel) -> impl Iterator<Item = DeviceId> {
-    let lost = &model.traffic.lost_at;
+    let lost = model.traffic.losses.times();
     let follows = move |device: &&Device| {
         let has_lost = |at: &&Instant| device.lost_step_within(**at, **at);
         lost.iter().filter(has_lost).nth(FOR_A_STEP - 1).is_some()
@@ -190,7 +194,7 @@ fn out_of_step(model: &NetworkModel) -> impl Iterator<Item = DeviceId> {
 
 /// The rhythm in which frames got lost, in words: at equal intervals, or in bursts.
 fn rhythm(traffic: &Traffic) -> Option<String> {
-    let mut times: Vec<Instant> = traffic.lost_at.iter().copied().collect();
+    let mut times: Vec<Instant> = traffic.losses.times().iter().copied().collect();
     times.sort_unstable();
     let mut gaps: Vec<u64> =
         times.windows(2).map(|pair| pair[1].since(pair[0]).as_nanos()).collect();

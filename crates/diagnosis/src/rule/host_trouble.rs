@@ -102,7 +102,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             let text =
                 format!("{} frames could not be sent by card {path}", card.send_failures.sum);
             // Who refuses frames for a while and then takes all of them stood still; damage comes again.
-            let returned = view.model.traffic.latest_returned.map(|seen| seen.at);
+            let returned = view.model.traffic.returns.latest().map(|seen| seen.at);
             let stood_still = last.since(first) <= QUIET && returned.is_some_and(|at| at > last);
             let (cause, other) = match stood_still {
                 true => (FaultName::WatchdogStarved, FaultName::NicDamaged),

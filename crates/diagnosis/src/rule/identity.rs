@@ -24,9 +24,9 @@ use linesman_proto::register::table;
 use linesman_proto::sii::Identity;
 use linesman_proto::time::Instant;
 
-use super::wiring::displaced;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::found_wiring::{self, displaced};
 use crate::model::{Device, NetworkModel, Planned, Seen};
 
 /// Another device.
@@ -88,7 +88,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     {
         return;
     }
-    if super::wiring::judges(model) || super::ring_reversed::judges(model) {
+    if found_wiring::is_wired_otherwise(model) || found_wiring::is_reversed_in_ring(model) {
         return;
     }
     let slots = slots(model);

@@ -35,7 +35,7 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let model = view.model;
-    for cyclic in model.cyclic.iter().filter(|cyclic| !cyclic.has_deficit()) {
+    for cyclic in model.cyclic.iter().filter(|cyclic| !cyclic.wkc.has_deficit()) {
         let now = cyclic.returned.last().unwrap_or(view.now);
         if model.owners(cyclic).next().is_none() {
             let sign = cyclic.motion.stopped(0, cyclic.len, now);

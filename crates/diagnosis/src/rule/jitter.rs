@@ -112,7 +112,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let (Some(first), Some(last)) = (spell.off.first(), spell.off.last()) else { return };
     // Whoever runs free takes outputs when they come. A recording, which has the times at which frames came to the
     // card, is the only witness of what the computer did before.
-    let is_recorded = !view.model.traffic.direction_known;
+    let is_recorded = !view.model.traffic.recording.is_direction_known();
     if in_step.is_empty() && !(is_recorded && spell.at_sending) {
         return;
     }

@@ -138,7 +138,7 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
     } else {
         (FaultName::HostJitter, FaultName::LateFrames)
     };
-    let is_recorded = !model.traffic.direction_known;
+    let is_recorded = !model.traffic.recording.is_direction_known();
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first.sent)
         .confidence(0.6)
         .or(other, 0.3)

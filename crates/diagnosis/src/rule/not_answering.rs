@@ -118,7 +118,7 @@ fn alone(model: &NetworkModel, device: &Device, absence: &Absence, is_cut_off: b
         condition = condition.ended(ended);
     }
     // Another tool's list says at once who is gone: those behind went with it.
-    if model.traffic.frames == 0 && !is_cut_off {
+    if model.traffic.recording.frames() == 0 && !is_cut_off {
         condition = condition.explaining(behind(model, device.id));
     }
     condition
@@ -300,7 +300,7 @@ fn cut_off(model: &NetworkModel, branch: &Branch) -> Condition {
     let direction = Some(LinkDirection::Both);
     let place = place_of(model, branch).unwrap_or(device);
     // A link that comes and goes takes the same shares from process data, again and again.
-    let outages = model.cyclic.iter().map(|cyclic| cyclic.deficits.len()).max().unwrap_or(0);
+    let outages = model.cyclic.iter().map(|cyclic| cyclic.wkc.deficits().len()).max().unwrap_or(0);
     let flaps = outages >= FLAPS;
     let mut text = silence_text(model, branch);
     if let Some(ended) = branch.ended {

@@ -33,17 +33,21 @@ const ENOUGH: u64 = 8;
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let traffic = &view.model.traffic;
-    if !traffic.is_one_sided() || traffic.sent + traffic.returned < ENOUGH {
+    if !traffic.is_one_sided() || traffic.requests.sent() + traffic.returns.count() < ENOUGH {
         return;
     }
-    let at = traffic.first.unwrap_or_default();
-    let text = if traffic.sent == 0 {
-        format!("all {} frames are on their way back; no request was recorded", traffic.returned)
+    let at = traffic.recording.first().unwrap_or_default();
+    let text = if traffic.requests.sent() == 0 {
+        format!(
+            "all {} frames are on their way back; no request was recorded",
+            traffic.returns.count()
+        )
     } else {
         format!(
             "all {} frames are on their way out; {} of their datagrams go to single SubDevices, so \
              answers came and were not recorded",
-            traffic.sent, traffic.lost_addressed
+            traffic.requests.sent(),
+            traffic.datagrams.lost_addressed()
         )
     };
     conditions.push(

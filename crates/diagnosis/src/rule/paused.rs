@@ -123,8 +123,8 @@ fn pause_before(
             } && kept_links(model, pause);
             return is_ours.then_some((pause, None));
         }
-        if let (Some(card), Some(last)) = (refused, model.traffic.latest_returned) {
-            let silences = model.traffic.silences.iter().rev();
+        if let (Some(card), Some(last)) = (refused, model.traffic.returns.latest()) {
+            let silences = model.traffic.losses.silences().iter().rev();
             let mut silences = silences.filter(|silence| silence.since.at < error.status.at);
             let silence = silences.next()?;
             let to = silence.ended.unwrap_or(last.at.max(silence.last.at));
@@ -142,7 +142,7 @@ fn pause_before(
 
 /// Whether the line had stopped to answer when a pause began, or while it lasted.
 fn was_silent(model: &NetworkModel, pause: Pause) -> bool {
-    model.traffic.silences.iter().any(|silence| {
+    model.traffic.losses.silences().iter().any(|silence| {
         let ended = silence.ended.unwrap_or(Instant::MAX);
         silence.since.at <= pause.to && ended >= pause.from
     })
@@ -188,7 +188,8 @@ fn condition(model: &NetworkModel, found: &PauseFound<'_>, all: &[DeviceId]) -> 
 /// Everything stopped and went on, and no link was lost, nothing restarted, nothing was counted anywhere:
 /// the frames did not leave this computer, or did not come into it.
 fn stalled(model: &NetworkModel) -> Option<Condition> {
-    let over = model.traffic.silences.iter().rev().filter_map(|one| Some((one, one.ended?)));
+    let over =
+        model.traffic.losses.silences().iter().rev().filter_map(|one| Some((one, one.ended?)));
     let (silence, ended) = over
         .into_iter()
         .find(|(one, ended)| one.frames >= SEVERAL && ended.since(one.since.at) >= STALLED)?;
@@ -263,7 +264,7 @@ fn stood_still(model: &NetworkModel) -> Option<Condition> {
     }
     let went_on = |pause: &Pause| {
         model.cyclic.iter().any(|cyclic| {
-            let has_begun = cyclic.first.at <= pause.from;
+            let has_begun = cyclic.wkc.first().at <= pause.from;
             has_begun && cyclic.sent.last().is_some_and(|last| last > pause.to)
         })
     };

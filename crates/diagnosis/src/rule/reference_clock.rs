@@ -40,7 +40,7 @@ const SYSTEM_TIME: RegisterAddress = RegisterAddress(0x0910);
 const AROUND: Span = Span::s(3);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
-    if view.model.traffic.datagrams_cut > 0 {
+    if view.model.traffic.recording.cut() > 0 {
         // The time that a frame brings back may be among what was cut off.
         return;
     }

@@ -166,17 +166,17 @@ fn ring_open(model: &NetworkModel) -> Option<Condition> {
 fn high_counters(model: &NetworkModel) -> Option<Condition> {
     let is_high = |cyclic: &&Cyclic| {
         let told = model.reported.expected.get(&cyclic.label());
-        told.is_some_and(|expected| cyclic.highest.value > *expected)
+        told.is_some_and(|expected| cyclic.wkc.highest().value > *expected)
     };
     let cyclic = model.cyclic.iter().find(is_high)?;
     let expected = model.reported.expected.get(&cyclic.label())?;
     let text = format!(
         "{}: working counter {}, and {expected} is expected",
         cyclic.label(),
-        cyclic.highest.value
+        cyclic.wkc.highest().value
     );
     let place = Place::Network { network: model.network };
-    let at = cyclic.highest.at;
+    let at = cyclic.wkc.highest().at;
     let condition = Condition::new(&PAGE, place, FaultName::ConfigMismatch, at)
         .confidence(0.5)
         .or(FaultName::DuplicateAddress, 0.1)

@@ -98,7 +98,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         if let Some(change) = own.next_back() {
             // Who was gone and is seen on its way up again was in INIT in between, read or not.
             let gone = outage(model, device, change);
-            let is_cut = model.traffic.datagrams_cut > 0;
+            let is_cut = model.traffic.recording.cut() > 0;
             if (is_cut || gone.is_none()) && model.traffic.may_lack(change.after, change.at) {
                 // The order may have been given in a frame that is not in the recording.
                 continue;
@@ -169,7 +169,7 @@ fn outage(model: &NetworkModel, device: &Device, change: &AlChange) -> Option<(I
     }
     // The first SubDevice has no neighbour before it: without it nothing at all comes back. It misses no
     // request of its own then, but those that it has no address for after its start.
-    let silences = model.traffic.silences.iter().rev();
+    let silences = model.traffic.losses.silences().iter().rev();
     let silences = silences.map(|one| (one.since.at, one.ended.unwrap_or(change.at)));
     let absences = device.joined_absences().into_iter().rev();
     let absences = absences.map(|absence| (absence.since.at, absence.ended.unwrap_or(change.at)));

@@ -43,7 +43,7 @@ const GONE: Span = Span::s(3);
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let model = view.model;
-    let senders = &model.traffic.senders;
+    let senders = &model.traffic.requests.senders();
     let has_host = senders.iter().any(|sender| sender.is_host);
     let is_one = |sender: &&Sender| {
         sender.own >= OWN

@@ -61,7 +61,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn is_behind(view: &View<'_>, device: &Device) -> bool {
     let Some(status) = device.al.status else { return false };
     let is_low = status.value.state().state().is_some_and(|state| state != AlState::Op);
-    let is_list = view.model.traffic.frames == 0;
+    let is_list = view.model.traffic.recording.frames() == 0;
     let lasts = is_list || view.has_ended || view.now.since(status.at) >= LASTS;
     // It may have gone on since, in frames that are not in the recording.
     let read = device.al.latest_reading.unwrap_or(status.at);

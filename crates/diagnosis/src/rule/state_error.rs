@@ -130,7 +130,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
     let is_new = view.now.since(error.status.at) < ACKNOWLEDGED_WITHIN && !view.has_ended;
     is_new
-        && view.model.traffic.frames > 0
+        && view.model.traffic.recording.frames() > 0
         && was_left_over(view.model, error)
         && error.ended.is_none()
 }
@@ -138,7 +138,7 @@ fn may_be_left_over(view: &View<'_>, error: &AlError) -> bool {
 /// Whether an error is of a time before this run: where process data went on while it stood, it belongs to them.
 fn was_left_over(model: &NetworkModel, error: &AlError) -> bool {
     let ended = error.ended.unwrap_or(error.status.at);
-    let is_running = model.cyclic.iter().any(|cyclic| cyclic.first.at < ended);
+    let is_running = model.cyclic.iter().any(|cyclic| cyclic.wkc.first().at < ended);
     error.was_left_over() && !is_running
 }
 

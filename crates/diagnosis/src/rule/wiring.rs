@@ -26,21 +26,20 @@
 //! the upper socket (X1) of most couplers. Where the wiring is what is wanted, scan anew and save the project.
 
 pub(super) mod entry;
-mod found;
 
-use linesman_config::compare::{Comparison, Difference, There, Unlike, Wanted};
+use linesman_config::compare::{Comparison, Difference, Unlike};
 use linesman_config::fault::{Class, FaultName};
 use linesman_config::identity;
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::table;
-use linesman_proto::time::Instant;
 use linesman_proto::topology::derive::EntryBasis;
 use linesman_proto::topology::{End, Tree};
 
 use super::identity::{EXTRA, MISSING, WRONG};
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::found_wiring::{FoundWiring, displaced, wanted};
 use crate::model::{NetworkModel, Seen};
 
 /// Plugged otherwise.
@@ -63,26 +62,6 @@ pub const TWINS: RulePage = RulePage {
 
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[PLUGGED, TWINS], judge };
-
-/// What was found, as far as it is enough to be laid upon the plan.
-struct FoundWiring<'a> {
-    model: &'a NetworkModel,
-    planned: &'a Tree,
-    wanted: Vec<Wanted>,
-    tree: Tree,
-    basis: Vec<EntryBasis>,
-    /// Whose answers those of a found node are taken for: positions move with what is missing.
-    ids: Vec<DeviceId>,
-    there: Vec<There>,
-    /// When the last of it was learnt.
-    at: Instant,
-    frame: Option<u64>,
-}
-
-/// Whether the trees can be compared, so that this rule speaks of devices missing, extra and wrong, too.
-pub(super) fn judges(model: &NetworkModel) -> bool {
-    FoundWiring::of(model).is_some_and(|found| found.tells(&found.compare()))
-}
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     compared(view, conditions);
@@ -402,21 +381,11 @@ impl<'a> FoundWiring<'a> {
 /// The planned ones in a row with one of them that nobody could tell from it.
 pub(super) fn equals_in_a_row(model: &NetworkModel, tree: &Tree, planned: usize) -> Vec<usize> {
     let alike = |other: usize| {
-        let [one, other] = [planned, other].map(|node| found::wanted(model.devices.get(node)));
+        let [one, other] = [planned, other].map(|node| wanted(model.devices.get(node)));
         let has_serial = one.identity.is_some_and(|identity| identity.serial_number != 0);
         one.identity.is_some() && one == other && one.alias.is_none() && !has_serial
     };
     tree.in_a_row(planned, alike)
-}
-
-/// What is seen of those whose answers are taken for those of others, since they stand elsewhere than planned:
-/// ports without a link where one belongs, working counters too low, states never reached, silence.
-pub(super) fn displaced(all: impl Iterator<Item = DeviceId>) -> impl Iterator<Item = Symptom> {
-    all.flat_map(|id| {
-        let of_port = move |port| [Symptom::LinkDown(id, port), Symptom::LinkCounted(id, port)];
-        let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::StateLost(id)];
-        Port::ALL.into_iter().flat_map(of_port).chain(own)
-    })
 }
 
 fn and_behind(count: usize) -> String {

@@ -17,6 +17,7 @@
 //!
 //! **What to do.** Look at the SubDevice's state and at the way to it.
 
+mod causes;
 mod trailing;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 
+use self::causes::DeficitSymptom;
 use super::{Rule, RulePage, View, processor_stopped};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::locate::{LinkLosses, cut_distance};
@@ -68,7 +70,7 @@ struct Suspects {
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // Datagrams of one device fail together: one finding for each set of suspects.
     let mut groups: BTreeMap<Suspects, Vec<(&Cyclic, &Deficit)>> = BTreeMap::new();
-    if view.model.cyclic.iter().all(|cyclic| cyclic.deficits.is_empty()) {
+    if view.model.cyclic.iter().all(|cyclic| cyclic.wkc.deficits().is_empty()) {
         return;
     }
     let lost = LinkLosses::all(view.model);
@@ -78,7 +80,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let judged = |deficit: &&Deficit| {
             !is_history(deficit) && !may_be_start_up(view.model, cyclic, deficit)
         };
-        for deficit in cyclic.deficits.iter().filter(judged) {
+        for deficit in cyclic.wkc.deficits().iter().filter(judged) {
             let explained = explained(conditions, deficit);
             let suspects = suspects(view, &lost, cyclic, deficit, &explained);
             groups.entry(suspects).or_default().push((cyclic, deficit));
@@ -97,7 +99,7 @@ fn may_be_start_up(model: &NetworkModel, cyclic: &Cyclic, deficit: &Deficit) -> 
             change.from.state().state() < change.to.state().state() && !change.from.error()
         })
     };
-    cyclic.low_before() == Some(deficit)
+    cyclic.wkc.low_before() == Some(deficit)
         && (model.devices.iter().any(went_up)
             || model.devices.iter().all(|device| device.al.status.is_none()))
 }
@@ -329,51 +331,19 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
         })
     });
     let nobody_known = suspects.devices.is_empty() && (lasts || link_changed.is_some());
-    // Again and again for a moment: a contact that opens, and nothing that hangs.
     let is_flapping = (!links.is_empty() || !suspects.is_certain || suspects.devices.is_empty())
         && deficits.len() >= FLAPS;
     let is_open = suspects.devices.len() > 1 && !suspects.is_certain && !lasts;
-    let (cause, confidence, others) = match known {
-        None if is_flapping => {
-            (FaultName::LinkFlapping, 0.4, [(FaultName::LinkOpen, 0.2), (FaultName::BrownOut, 0.1)])
-        }
-        // All behind a link, or nobody knows whose: a cable, or the supply of a device, takes shares for good.
-        _ if !links.is_empty() => {
-            (FaultName::LinkOpen, 0.5, [(FaultName::DeviceOff, 0.2), (FaultName::SupplyOff, 0.1)])
-        }
-        None if nobody_known && link_changed.is_some() => {
-            (FaultName::LinkOpen, 0.4, [(FaultName::DeviceOff, 0.25), (FaultName::BrownOut, 0.15)])
-        }
-        None if nobody_known => (
-            FaultName::LinkOpen,
-            0.3,
-            [(FaultName::DeviceOff, 0.2), (FaultName::FirmwareFault, 0.15)],
-        ),
-        // It came and went by itself: nothing that hangs, and nothing that was set up wrongly.
-        None if is_open => (
-            FaultName::LinkOpen,
-            0.35,
-            [(FaultName::FirmwareFault, 0.25), (FaultName::BrownOut, 0.1)],
-        ),
-        Some(Trouble::Absent(_)) => {
-            (FaultName::DeviceOff, 0.4, [(FaultName::LinkOpen, 0.35), (FaultName::BrownOut, 0.1)])
-        }
-        Some(Trouble::Error(_)) => (
-            FaultName::FirmwareFault,
-            0.5,
-            [(FaultName::ConfigMismatch, 0.2), (FaultName::WatchdogStarved, 0.1)],
-        ),
-        Some(Trouble::Fall(_)) => (
-            FaultName::BrownOut,
-            0.5,
-            [(FaultName::FirmwareFault, 0.2), (FaultName::DeviceOff, 0.1)],
-        ),
-        None => (
-            FaultName::FirmwareFault,
-            0.4,
-            [(FaultName::DeviceOff, 0.2), (FaultName::ConfigMismatch, 0.2)],
-        ),
+    let symptom = match &known {
+        None if is_flapping => DeficitSymptom::AgainAndAgain,
+        _ if !links.is_empty() => DeficitSymptom::BehindLink,
+        Some(trouble) => DeficitSymptom::of_trouble(trouble),
+        None if nobody_known && link_changed.is_some() => DeficitSymptom::LinkChanged,
+        None if nobody_known => DeficitSymptom::Nobody,
+        None if is_open => DeficitSymptom::Passing,
+        None => DeficitSymptom::DeficitAlone,
     };
+    let [(cause, confidence), others @ ..] = symptom.causes();
     let mut condition = Condition::new(&PAGE, place, cause, since).confidence(confidence);
     // Why it is so shows when states and links were read since.
     let is_sure = known.is_some() || view.has_ended || since + ASKED <= view.now;

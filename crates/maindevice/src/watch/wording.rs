@@ -7,7 +7,8 @@ use linesman_config::inventory::label;
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::port::Port;
-use linesman_proto::time::Instant;
+use linesman_proto::register::{DlStatus, ErrorCounters};
+use linesman_proto::time::{Instant, Span};
 
 use super::{EntryKind, LogEntry, NetworkStatus, Severity};
 use crate::event::Event;
@@ -20,17 +21,10 @@ pub(super) fn of(
     plan: &Plan,
     network_status: &NetworkStatus,
 ) -> Vec<LogEntry> {
-    let about = |id: DeviceId, severity, kind, text: String| LogEntry {
-        at,
-        severity,
-        kind,
-        device: Some(id),
-        text: format!("{}{text}", name(plan, id)),
-    };
-    let line = |severity, kind, text: String| LogEntry { at, severity, kind, device: None, text };
+    let words = EntryWords { at, plan, network_status };
     match event {
         Event::AbnormalState { id, .. } => {
-            states(at, event, plan, Some(*id), Severity::Error, EntryKind::AbnormalState)
+            words.states(event, Some(*id), Severity::Error, EntryKind::AbnormalState)
         }
         Event::Refused { id, .. }
         | Event::StepTimedOut { id, .. }
@@ -38,21 +32,21 @@ pub(super) fn of(
         | Event::WrongModule { id, .. }
         | Event::CycleTooShort { id, .. }
         | Event::ModulesUnread { id, .. } => {
-            states(at, event, plan, Some(*id), Severity::Error, EntryKind::StateAborted)
+            words.states(event, Some(*id), Severity::Error, EntryKind::StateAborted)
         }
         Event::TargetReached { id, .. } => {
-            states(at, event, plan, Some(*id), Severity::Info, EntryKind::State)
+            words.states(event, Some(*id), Severity::Info, EntryKind::State)
         }
         Event::WrongDevice { id, .. } | Event::AliasShared { id, .. } => {
-            states(at, event, plan, Some(*id), Severity::Error, EntryKind::Identity)
+            words.states(event, Some(*id), Severity::Error, EntryKind::Identity)
         }
         Event::UnplannedDevice { .. } => {
-            states(at, event, plan, None, Severity::Warning, EntryKind::Identity)
+            words.states(event, None, Severity::Warning, EntryKind::Identity)
         }
-        Event::AllReached => vec![line(
+        Event::AllReached => vec![words.line(
             Severity::Info,
             EntryKind::State,
-            match plan.devices.len() {
+            match words.plan.devices.len() {
                 1 => "the SubDevice has reached its state".to_owned(),
                 count => format!("all {count} SubDevices have reached their states"),
             },
@@ -60,7 +54,7 @@ pub(super) fn of(
         Event::DeviceBack { id, restarted } => {
             let how = if *restarted { ", after a restart" } else { "" };
             let text = format!(" Communication re-established{how}");
-            vec![about(*id, Severity::Info, EntryKind::Communication, text)]
+            vec![words.about(*id, Severity::Info, EntryKind::Communication, text)]
         }
         Event::Responding { before, now } => {
             let severity = if now < before { Severity::Warning } else { Severity::Info };
@@ -68,103 +62,33 @@ pub(super) fn of(
                 1 => format!("1 SubDevice answers, {before} did before"),
                 _ => format!("{now} SubDevices answer, {before} did before"),
             };
-            vec![line(severity, EntryKind::Communication, text)]
+            vec![words.line(severity, EntryKind::Communication, text)]
         }
         Event::Ring { intact: true } => {
-            vec![line(Severity::Info, EntryKind::Ring, "the ring is closed".into())]
+            vec![words.line(Severity::Info, EntryKind::Ring, "the ring is closed".into())]
         }
-        Event::Ring { intact: false } => vec![line(
+        Event::Ring { intact: false } => vec![words.line(
             Severity::Warning,
             EntryKind::Ring,
             "the ring is open: frames come back to the card that sent them".into(),
         )],
-        Event::Links { id, status } => {
-            let Some(before) = network_status.device(*id).and_then(super::WatchedDevice::links)
-            else {
-                return Vec::new();
-            };
-            let change = |port| {
-                let (then, now) = (before.port_state(port), status.port_state(port));
-                let word = match (then.communication, now.communication) {
-                    (true, false) => "lost its neighbour",
-                    (false, true) => "has a neighbour",
-                    (true, true) | (false, false) => return None,
-                };
-                let severity = if now.communication { Severity::Info } else { Severity::Warning };
-                Some(about(*id, severity, EntryKind::Link, format!(": port {port} {word}")))
-            };
-            Port::ALL.into_iter().filter_map(change).collect()
-        }
+        Event::Links { id, status } => words.links(*id, *status),
         Event::PortOpened { id, port } => {
             let text = format!(": port {port} has its link again and was ordered to open");
-            vec![about(*id, Severity::Info, EntryKind::Link, text)]
+            vec![words.about(*id, Severity::Info, EntryKind::Link, text)]
         }
         Event::Counters { id, counters } | Event::CountersCleared { id, counters } => {
-            let rises = network_status.counters(*id).map(|known| known.rises(counters));
-            let rises = rises.unwrap_or_default();
-            let texts = rises.iter().map(|(counter, rise)| format!("{counter} +{rise}"));
-            let texts: Vec<_> = texts.collect();
-            if texts.is_empty() {
-                return Vec::new();
-            }
-            let text = format!(": error counters rose: {}", texts.join("; "));
-            // Whoever only saw marks of another one has no trouble of its own.
-            let is_own = rises.iter().any(|(counter, _)| counter.counts_own());
-            let severity = if is_own { Severity::Warning } else { Severity::Info };
-            vec![about(*id, severity, EntryKind::Counter, text)]
+            words.counters(*id, counters)
         }
         Event::ClockDifference { id, difference, window, apart } => {
-            let before =
-                network_status.device(*id).is_some_and(super::WatchedDevice::is_clock_apart);
-            let (severity, how) = match (before, *apart) {
-                (false, true) => (Severity::Warning, "has left the sync window"),
-                (true, false) => (Severity::Info, "is within the sync window again"),
-                (false, false) | (true, true) => return Vec::new(),
-            };
-            let text = format!(
-                ": its clock {how}: {difference} off the reference clock, {window} allowed"
-            );
-            vec![about(*id, severity, EntryKind::Clock, text)]
+            words.clock(*id, *difference, *window, *apart)
         }
-        Event::WorkingCounter { task, frame, datagram, expected, received } => vec![line(
-            Severity::Warning,
-            EntryKind::WorkingCounter,
-            format!(
-                "working counter of {}, frame {frame}, datagram {datagram}: {received} received and {expected} expected",
-                named(plan, *task)
-            ),
-        )],
-        Event::WorkingCounterGood { task, frame, datagram } => vec![line(
-            Severity::Info,
-            EntryKind::WorkingCounter,
-            format!(
-                "working counter of {}, frame {frame}, datagram {datagram} is right again",
-                named(plan, *task)
-            ),
-        )],
-        Event::CyclicFramesLost { task } => vec![line(
-            Severity::Error,
-            EntryKind::Frames,
-            format!("frames of {} do not come back", named(plan, *task)),
-        )],
-        Event::CyclicFramesBack { task, lost } => vec![line(
-            Severity::Info,
-            EntryKind::Frames,
-            format!("frames of {} come back; missed {lost} times", named(plan, *task)),
-        )],
-        Event::OutputsWithheld { task } => vec![line(
-            Severity::Error,
-            EntryKind::Host,
-            format!(
-                "the application is late: outputs of {} are withheld, so that watchdogs can expire",
-                named(plan, *task)
-            ),
-        )],
-        Event::OutputsResumed { task } => vec![line(
-            Severity::Info,
-            EntryKind::Host,
-            format!("the application is back: outputs of {} are sent again", named(plan, *task)),
-        )],
+        Event::WorkingCounter { .. }
+        | Event::WorkingCounterGood { .. }
+        | Event::CyclicFramesLost { .. }
+        | Event::CyclicFramesBack { .. }
+        | Event::OutputsWithheld { .. }
+        | Event::OutputsResumed { .. } => words.task(event),
         Event::Emergency { id, emergency } => {
             let text = format!(
                 ": emergency 0x{:04X} ({}), error register 0x{:02X}",
@@ -172,13 +96,139 @@ pub(super) fn of(
                 emergency.class().text(),
                 emergency.register.0
             );
-            vec![about(*id, Severity::Error, EntryKind::Emergency, text)]
+            vec![words.about(*id, Severity::Error, EntryKind::Emergency, text)]
         }
         Event::SdoUploaded { id, result: Err(error), .. }
         | Event::SdoDownloaded { id, result: Err(error), .. } => {
-            vec![about(*id, Severity::Warning, EntryKind::Mailbox, format!(": CoE: {error}"))]
+            vec![words.about(*id, Severity::Warning, EntryKind::Mailbox, format!(": CoE: {error}"))]
         }
         _ => Vec::new(),
+    }
+}
+
+/// What the words of an entry need beside the event.
+struct EntryWords<'a> {
+    at: Instant,
+    plan: &'a Plan,
+    network_status: &'a NetworkStatus,
+}
+
+impl EntryWords<'_> {
+    /// An entry about a SubDevice.
+    fn about(&self, id: DeviceId, severity: Severity, kind: EntryKind, text: String) -> LogEntry {
+        let text = format!("{}{text}", name(self.plan, id));
+        LogEntry { at: self.at, severity, kind, device: Some(id), text }
+    }
+
+    /// An entry about the network.
+    fn line(&self, severity: Severity, kind: EntryKind, text: String) -> LogEntry {
+        LogEntry { at: self.at, severity, kind, device: None, text }
+    }
+
+    /// What [`Event::state_lines`] has words for.
+    fn states(
+        &self,
+        event: &Event,
+        device: Option<DeviceId>,
+        severity: Severity,
+        kind: EntryKind,
+    ) -> Vec<LogEntry> {
+        let lines = event.state_lines(|id| name(self.plan, id));
+        let entry = |text| LogEntry { at: self.at, severity, kind, device, text };
+        lines.into_iter().map(entry).collect()
+    }
+
+    fn links(&self, id: DeviceId, status: DlStatus) -> Vec<LogEntry> {
+        let Some(before) = self.network_status.device(id).and_then(super::WatchedDevice::links)
+        else {
+            return Vec::new();
+        };
+        let change = |port| {
+            let (then, now) = (before.port_state(port), status.port_state(port));
+            let word = match (then.communication, now.communication) {
+                (true, false) => "lost its neighbour",
+                (false, true) => "has a neighbour",
+                (true, true) | (false, false) => return None,
+            };
+            let severity = if now.communication { Severity::Info } else { Severity::Warning };
+            Some(self.about(id, severity, EntryKind::Link, format!(": port {port} {word}")))
+        };
+        Port::ALL.into_iter().filter_map(change).collect()
+    }
+
+    fn counters(&self, id: DeviceId, counters: &ErrorCounters) -> Vec<LogEntry> {
+        let rises = self.network_status.counters(id).map(|known| known.rises(counters));
+        let rises = rises.unwrap_or_default();
+        let texts = rises.iter().map(|(counter, rise)| format!("{counter} +{rise}"));
+        let texts: Vec<_> = texts.collect();
+        if texts.is_empty() {
+            return Vec::new();
+        }
+        let text = format!(": error counters rose: {}", texts.join("; "));
+        // Whoever only saw marks of another one has no trouble of its own.
+        let is_own = rises.iter().any(|(counter, _)| counter.counts_own());
+        let severity = if is_own { Severity::Warning } else { Severity::Info };
+        vec![self.about(id, severity, EntryKind::Counter, text)]
+    }
+
+    fn clock(&self, id: DeviceId, difference: Span, window: Span, apart: bool) -> Vec<LogEntry> {
+        let before =
+            self.network_status.device(id).is_some_and(super::WatchedDevice::is_clock_apart);
+        let (severity, how) = match (before, apart) {
+            (false, true) => (Severity::Warning, "has left the sync window"),
+            (true, false) => (Severity::Info, "is within the sync window again"),
+            (false, false) | (true, true) => return Vec::new(),
+        };
+        let text =
+            format!(": its clock {how}: {difference} off the reference clock, {window} allowed");
+        vec![self.about(id, severity, EntryKind::Clock, text)]
+    }
+
+    /// Frames, working counters and outputs of a task.
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others are not of a task")]
+    fn task(&self, event: &Event) -> Vec<LogEntry> {
+        match event {
+            Event::WorkingCounter { task, frame, datagram, expected, received } => vec![self.line(
+                Severity::Warning,
+                EntryKind::WorkingCounter,
+                format!(
+                    "working counter of {}, frame {frame}, datagram {datagram}: {received} received and {expected} expected",
+                    named(self.plan, *task)
+                ),
+            )],
+            Event::WorkingCounterGood { task, frame, datagram } => vec![self.line(
+                Severity::Info,
+                EntryKind::WorkingCounter,
+                format!(
+                    "working counter of {}, frame {frame}, datagram {datagram} is right again",
+                    named(self.plan, *task)
+                ),
+            )],
+            Event::CyclicFramesLost { task } => vec![self.line(
+                Severity::Error,
+                EntryKind::Frames,
+                format!("frames of {} do not come back", named(self.plan, *task)),
+            )],
+            Event::CyclicFramesBack { task, lost } => vec![self.line(
+                Severity::Info,
+                EntryKind::Frames,
+                format!("frames of {} come back; missed {lost} times", named(self.plan, *task)),
+            )],
+            Event::OutputsWithheld { task } => vec![self.line(
+                Severity::Error,
+                EntryKind::Host,
+                format!(
+                    "the application is late: outputs of {} are withheld, so that watchdogs can expire",
+                    named(self.plan, *task)
+                ),
+            )],
+            Event::OutputsResumed { task } => vec![self.line(
+                Severity::Info,
+                EntryKind::Host,
+                format!("the application is back: outputs of {} are sent again", named(self.plan, *task)),
+            )],
+            _ => Vec::new(),
+        }
     }
 }
 
@@ -210,19 +260,6 @@ pub(super) fn carrier(at: Instant, card: Path, carrier: bool) -> LogEntry {
     };
     let text = format!("card {card} {word}");
     LogEntry { at, severity, kind: EntryKind::Host, device: None, text }
-}
-
-/// What [`Event::state_lines`] has words for.
-fn states(
-    at: Instant,
-    event: &Event,
-    plan: &Plan,
-    device: Option<DeviceId>,
-    severity: Severity,
-    kind: EntryKind,
-) -> Vec<LogEntry> {
-    let lines = event.state_lines(|id| name(plan, id));
-    lines.into_iter().map(|text| LogEntry { at, severity, kind, device, text }).collect()
 }
 
 /// `task 'motion'`.

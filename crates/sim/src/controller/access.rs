@@ -86,7 +86,7 @@ impl Core {
             copy(&self.memory.bytes()[io.clone()], &mut out[..io.len()], ors);
             any = true;
         }
-        if end > RAM && self.loaded {
+        if end > RAM && self.startup.loaded {
             let from = place.max(RAM);
             copy(self.memory.ram(from, end), &mut out[from - place..], ors);
             any = true;
@@ -211,7 +211,7 @@ impl Core {
             self.memory.put(io.start, &data[io.start - place..io.end - place]);
             any = true;
         }
-        if end > RAM && self.loaded {
+        if end > RAM && self.startup.loaded {
             let from = place.max(RAM);
             self.memory.copy_in(from, &data[from - place..]);
             any = true;

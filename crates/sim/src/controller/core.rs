@@ -5,25 +5,25 @@
 use std::sync::Arc;
 
 use linesman_proto::address::{DeviceId, RegisterAddress};
-use linesman_proto::port::{Port, PortMap};
+use linesman_proto::port::Port;
 use linesman_proto::register::{
     self as r, AlControl, AlStatus, DlControl, EscInformation, Features, FmmuConfig,
     PortDescriptor, PortType, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::time::Instant;
 
-use super::clock::{LocalClock, RunningClock, SyncUnit, TimeLoop};
+use super::clock::{FrameEntries, LocalClock, RunningClock, SyncUnit, TimeLoop};
 use super::fmmu::Fmmus;
 use super::implemented::ClockUnits;
 use super::kind::ControllerKind;
-use super::loops::Loops;
 use super::memory::{Memory, Rights, at};
 use super::phy::Phys;
-use super::port_event::Queue;
+use super::port::ControllerPorts;
+use super::rx_code::RxReasons;
 use super::shadow::Shadow;
 use super::sii::Sii;
 use super::sync_manager::{self, SyncManagers};
-use super::watchdog::{Watchdog, WatchdogExpiry};
+use super::watchdog::Watchdogs;
 use crate::hardware::PortKind;
 
 /// All that a MainDevice sees.
@@ -33,16 +33,12 @@ pub(super) struct Core {
     pub(super) hardware: ControllerKind,
     pub(super) memory: Memory,
     pub(super) rights: Arc<Rights>,
-    pub(super) loops: Loops,
-    pub(super) queue: Queue,
+    pub(super) ports: ControllerPorts,
     pub(super) fmmus: Fmmus,
     pub(super) sync_managers: SyncManagers,
     pub(super) sii: Sii,
     pub(super) phys: Phys,
-    /// The controller keeps reasons of receive errors (0x0320).
-    pub(super) keeps_reasons: bool,
-    /// For those that do: when the last frame of a port ends.
-    pub(super) frame_until: PortMap<Instant>,
+    pub(super) rx_reasons: RxReasons,
     pub(super) shadow: Shadow,
     /// A copy of data that commands which read and write need, kept for its memory.
     pub(super) scratch: Vec<u8>,
@@ -50,43 +46,43 @@ pub(super) struct Core {
     quartz: LocalClock,
     pub(super) time_loop: TimeLoop,
     pub(super) sync: SyncUnit,
-    pub(super) powered_at: Instant,
-    /// The configuration area is loaded: process-data RAM can be reached.
-    pub(super) loaded: bool,
-    /// The device behind has been started.
-    pub(super) started: bool,
+    pub(super) startup: Startup,
     /// A frame has set something going: what is due next must be found anew.
     pub(super) rescheduled: bool,
     /// ECAT events that the mask lets through, for the datagrams that pass.
     pub(super) irq: u16,
-    pub(super) process_data_watchdog: Watchdog,
-    pub(super) pdi_watchdog: Watchdog,
-    pub(super) pdi_watchdog_ok: bool,
-    /// Watchdogs that ran out, until somebody asks.
-    pub(super) expiries: Vec<WatchdogExpiry>,
+    pub(super) watchdogs: Watchdogs,
     /// The processor behind the controller has stopped serving it.
     pub(super) processor_stuck: bool,
     /// Where a coding switch is read, and what it says.
     pub(super) coding_switch: Option<(RegisterAddress, u16)>,
     /// AL status does not copy AL control although device emulation is on: a fault.
     pub(super) emulation_suspended: bool,
-    /// When written loop modes take effect: at the end of the frame that wrote them.
-    pub(super) loops_change_at: Option<Instant>,
-    /// When temporary loop modes end, and the byte that returns.
-    pub(super) loops_return: Option<(Instant, u8)>,
-    /// The last loss of a link that was reported for each port.
-    pub(super) link_lost_at: PortMap<Option<Instant>>,
-    pub(super) reset_at: Option<Instant>,
-    reset_frame: u64,
+    pub(super) reset: EscReset,
     /// When the device behind is to be called.
     pub(super) firmware_at: Option<Instant>,
-    /// The last frame whose first bit came in by each port, and when.
-    pub(super) entered: PortMap<(u64, Instant)>,
-    /// The frame whose receive times are being latched.
-    pub(super) latched: Option<u64>,
-    /// Ports that take the time of the next frame which comes in after an instant.
-    pub(super) latch_waits: PortMap<Option<Instant>>,
+    pub(super) entries: FrameEntries,
     pub(super) passing: FrameProgress,
+}
+
+/// How far a controller has come since its power came.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) struct Startup {
+    /// When the power came: ticks of watchdogs count from here.
+    pub(super) powered_at: Instant,
+    /// The configuration area is loaded: process-data RAM can be reached.
+    pub(super) loaded: bool,
+    /// The device behind has been started. Never before the configuration area is loaded.
+    pub(super) started: bool,
+}
+
+/// A reset that a MainDevice or the processor orders by the sequence `R`, `E`, `S`.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) struct EscReset {
+    /// When it is carried out, once the sequence is complete.
+    pub(super) at: Option<Instant>,
+    /// The frame that wrote the latest byte of the sequence: each comes by one of its own.
+    frame: u64,
 }
 
 /// What the frame that passes the processing unit has done so far, beside its writes.
@@ -119,41 +115,28 @@ impl Core {
             id,
             memory: Memory::new(&hardware),
             rights: hardware.rights(ClockUnits::default()),
-            loops: Loops::new(&hardware),
-            queue: Queue::default(),
+            ports: ControllerPorts::new(&hardware),
             fmmus: Fmmus::new(),
             sync_managers: SyncManagers::new(Features(hardware.features).sequential_mode()),
             sii: Sii::new(sii, &hardware),
             phys: Phys::new(&hardware),
-            keeps_reasons: super::implemented::keeps_reasons(&hardware),
-            frame_until: PortMap([Instant::ZERO; 4]),
+            rx_reasons: RxReasons::new(super::implemented::keeps_reasons(&hardware)),
             shadow: Shadow::default(),
             scratch: Vec::new(),
             clock: RunningClock::new(quartz, Instant::ZERO),
             quartz,
             time_loop: TimeLoop::default(),
             sync: SyncUnit::default(),
-            powered_at: Instant::ZERO,
-            loaded: false,
-            started: false,
+            startup: Startup::default(),
             rescheduled: false,
             irq: 0,
-            process_data_watchdog: Watchdog::default(),
-            pdi_watchdog: Watchdog::default(),
-            pdi_watchdog_ok: true,
-            expiries: Vec::new(),
+            watchdogs: Watchdogs::default(),
             processor_stuck: false,
             coding_switch: None,
             emulation_suspended: false,
-            loops_change_at: None,
-            loops_return: None,
-            link_lost_at: PortMap::default(),
-            reset_at: None,
-            reset_frame: 0,
+            reset: EscReset::default(),
             firmware_at: None,
-            entered: PortMap([(u64::MAX, Instant::ZERO); 4]),
-            latched: None,
-            latch_waits: PortMap::default(),
+            entries: FrameEntries::default(),
             passing: FrameProgress::default(),
             hardware,
         }
@@ -162,23 +145,18 @@ impl Core {
     /// Everything as after power-on but for the links, which belong to the wires.
     pub(super) fn start(&mut self, now: Instant) {
         self.memory.clear();
-        self.loops.reset();
+        self.ports.restart();
         self.clock = RunningClock::new(self.quartz, now);
-        self.powered_at = now;
-        self.loaded = false;
+        self.startup = Startup { powered_at: now, ..Startup::default() };
         self.rights = self.hardware.rights(ClockUnits::default());
         self.time_loop = TimeLoop::default();
         self.sync = self.sync.restarted();
-        self.started = false;
         self.irq = 0;
-        self.process_data_watchdog.stop();
-        self.pdi_watchdog.stop();
-        self.pdi_watchdog_ok = true;
+        self.watchdogs.restart();
         self.processor_stuck = false;
-        (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
+        self.reset.at = None;
         self.firmware_at = None;
-        self.latched = None;
-        self.latch_waits = PortMap::default();
+        self.entries.forget_latches();
         self.shadow.clear();
         self.identify();
         self.put_reset_values();
@@ -255,11 +233,10 @@ impl Core {
 
     pub(super) fn power_off(&mut self) {
         self.sii.power_off();
-        self.loops = Loops::new(&self.hardware);
-        self.loaded = false;
-        self.process_data_watchdog.stop();
-        self.pdi_watchdog.stop();
-        (self.loops_change_at, self.loops_return, self.reset_at) = (None, None, None);
+        self.ports.power_off(&self.hardware);
+        self.startup.loaded = false;
+        self.watchdogs.stop();
+        self.reset.at = None;
         self.firmware_at = None;
         self.irq = 0;
         self.sync = self.sync.restarted();
@@ -268,13 +245,13 @@ impl Core {
     /// The configuration area was loaded: what depends on it follows.
     pub(super) fn loaded(&mut self) {
         const DEACTIVATED: u8 = 0;
-        self.loaded = true;
+        self.startup.loaded = true;
         let a0 = self.memory.u8(&r::ESC_CONFIGURATION_A0);
         let a5 = self.memory.u16(&r::ESC_CONFIGURATION_A5);
         let units = ClockUnits::configured(&self.hardware, a0, a5);
         self.rights = self.hardware.rights(units);
         // Without an interface nobody triggers its watchdog, as the EK1100 shows.
-        self.pdi_watchdog_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
+        self.watchdogs.pdi_ok = self.memory.u8(&r::PDI_CONTROL) != DEACTIVATED;
     }
 
     /// Calls the device behind at `when`, or earlier if it was to be called earlier anyway.
@@ -296,8 +273,8 @@ impl Core {
 
     /// A byte of the reset sequence was written: `R`, `E`, `S` in three frames.
     pub(super) fn reset_written(&mut self, value: u8, end: Instant) {
-        let another_frame = self.reset_frame != self.passing.number;
-        self.reset_frame = self.passing.number;
+        let another_frame = self.reset.frame != self.passing.number;
+        self.reset.frame = self.passing.number;
         self.reset_step(&r::ESC_RESET_ECAT, value, another_frame, end);
     }
 
@@ -318,7 +295,7 @@ impl Core {
         };
         self.memory.set_u8(register, step as u8);
         if step == SEQUENCE.len() {
-            self.reset_at = Some(when);
+            self.reset.at = Some(when);
         }
     }
 }

@@ -100,8 +100,8 @@ impl Controller {
     pub fn power_on(&mut self, at: Instant) {
         self.powered = true;
         self.samples = false;
-        while let Some(first) = self.core.queue.next_at().filter(|first| *first < at) {
-            self.core.queue.pop_until(first);
+        while let Some(first) = self.core.ports.queue.next_at().filter(|first| *first < at) {
+            self.core.ports.queue.pop_until(first);
         }
         self.core.start(at);
         self.reschedule();
@@ -114,7 +114,7 @@ impl Controller {
             self.firmware.stop(signals);
         }
         self.power_on(at);
-        while !self.core.loaded && self.core.sii.done_at().is_some() {
+        while !self.core.startup.loaded && self.core.sii.done_at().is_some() {
             self.finish_sii(at, signals);
         }
         self.reschedule();
@@ -153,7 +153,7 @@ impl Controller {
             self.firmware.stop(signals);
         }
         if !self.powered {
-            while self.core.queue.pop_until(now).is_some() {}
+            while self.core.ports.queue.pop_until(now).is_some() {}
         }
         loop {
             let (at, due) = self.due();
@@ -186,14 +186,14 @@ impl Controller {
                 first = (at, due);
             }
         };
-        consider(core.queue.next_at(), Due::Port);
-        consider(core.loops_change_at, Due::Loops);
-        consider(core.loops_return.map(|(at, _)| at), Due::LoopsReturn);
+        consider(core.ports.queue.next_at(), Due::Port);
+        consider(core.ports.change_at, Due::Loops);
+        consider(core.ports.returns.map(|(at, _)| at), Due::LoopsReturn);
         consider(core.sii.done_at(), Due::Sii);
         consider(core.phys.done_at(), Due::Phy);
-        consider(core.process_data_watchdog.expires(), Due::ProcessDataWatchdog);
-        consider(core.pdi_watchdog.expires(), Due::PdiWatchdog);
-        consider(core.reset_at, Due::Reset);
+        consider(core.watchdogs.process_data_expires(), Due::ProcessDataWatchdog);
+        consider(core.watchdogs.pdi_expires(), Due::PdiWatchdog);
+        consider(core.reset.at, Due::Reset);
         consider(core.sync.due(), Due::Sync);
         consider(core.firmware_at, Due::Firmware);
         first
@@ -207,7 +207,7 @@ impl Controller {
         let core = &mut self.core;
         match due {
             Due::Port => {
-                if let Some((_, event)) = core.queue.pop_until(at) {
+                if let Some((_, event)) = core.ports.queue.pop_until(at) {
                     core.happens(event, at);
                 }
             }
@@ -229,7 +229,7 @@ impl Controller {
 
     fn finish_sii(&mut self, at: Instant, signals: &mut Signals) {
         let core = &mut self.core;
-        let starting = !core.started;
+        let starting = !core.startup.started;
         match core.sii.finish(&mut core.memory) {
             Outcome::None => return,
             Outcome::Loaded => core.loaded(),
@@ -237,7 +237,7 @@ impl Controller {
         }
         core.refresh_dl_status();
         if starting {
-            core.started = true;
+            core.startup.started = true;
             self.firmware.start(at, &mut Pdi { core, signals, now: at });
             self.samples = self.firmware.samples();
             core.sync.heard = self.firmware.synchronises();
@@ -277,7 +277,7 @@ impl Controller {
 
     /// The wire tells what a port sees; it happens when [`Controller::advance`] reaches `at`.
     pub fn post(&mut self, at: Instant, event: PortEvent) {
-        self.core.queue.push(at, QueuedEvent::Posted(event));
+        self.core.ports.queue.push(at, QueuedEvent::Posted(event));
         if self.powered {
             self.next = self.next.min(at);
         }
@@ -288,7 +288,7 @@ impl Controller {
     #[inline]
     #[must_use]
     pub fn is_open(&self, port: Port) -> bool {
-        self.powered && self.core.loops.is_open(port)
+        self.powered && self.core.ports.loops.is_open(port)
     }
 
     /// Whether the loop of a port will be open at `at`, as far as events posted so far tell, without
@@ -305,7 +305,7 @@ impl Controller {
     /// and its mode is auto or auto close. Such frames may pass once.
     #[must_use]
     pub fn port_zero_closes_ring(&self) -> bool {
-        self.core.loops.port_zero_closes_ring()
+        self.core.ports.loops.port_zero_closes_ring()
     }
 
     /// The first bit of a frame reaches a port from outside at `at`, whether its loop is open or
@@ -314,7 +314,7 @@ impl Controller {
     pub fn enters(&mut self, at: Instant, port: Port, frame: &WireFrame) {
         if self.powered {
             self.core.enters(at, port, frame);
-            if let Some(first) = self.core.queue.next_at() {
+            if let Some(first) = self.core.ports.queue.next_at() {
                 self.next = self.next.min(first);
             }
         }

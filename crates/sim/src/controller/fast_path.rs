@@ -64,11 +64,11 @@ impl Controller {
         let writes_registers =
             |config: &FmmuConfig| config.writes && config.physical_start.0 < REGISTERS_END;
         let waits_for_time =
-            |port: Port| core.latch_waits[port].is_some() && core.loops.is_open(port);
+            |port: Port| core.entries.waits[port].is_some() && core.ports.loops.is_open(port);
         FastPathInfo {
-            open: if self.powered { core.loops.open_bits() } else { 0 },
-            acts_on_all_frames: core.loops.port_zero_closes_ring()
-                || core.loops.waits_for_any_frame()
+            open: if self.powered { core.ports.loops.open_bits() } else { 0 },
+            acts_on_all_frames: core.ports.loops.port_zero_closes_ring()
+                || core.ports.loops.waits_for_any_frame()
                 || core.phys.has_actions()
                 || Port::ALL.into_iter().any(waits_for_time)
                 || core.fmmus.active().any(writes_registers),
@@ -93,10 +93,10 @@ impl Controller {
     pub(crate) fn next_way_event(&self) -> Option<Instant> {
         let core = &self.core;
         let due = [
-            core.queue.next_way_at(),
-            core.loops_change_at,
-            core.loops_return.map(|(at, _)| at),
-            core.reset_at,
+            core.ports.queue.next_way_at(),
+            core.ports.change_at,
+            core.ports.returns.map(|(at, _)| at),
+            core.reset.at,
         ];
         due.into_iter().flatten().min()
     }
@@ -110,16 +110,16 @@ impl Controller {
     /// A frame that did not walk came in at a port.
     #[inline]
     pub(crate) fn note_entry(&mut self, port: Port, number: u64, at: Instant, duration: Span) {
-        self.core.entered[port] = (number, at);
-        if self.core.keeps_reasons {
-            self.core.frame_until[port] = at + duration;
+        self.core.entries.entered[port] = (number, at);
+        if let Some(ends) = self.core.rx_reasons.frame_ends(port) {
+            *ends = at + duration;
         }
     }
 
     /// Whether anything is to happen at its ports.
     #[inline]
     pub(crate) fn has_port_events(&self) -> bool {
-        self.core.queue.next_at().is_some()
+        self.core.ports.queue.next_at().is_some()
     }
 
     // ---- sampling ----

@@ -71,12 +71,12 @@ impl Controller {
     /// Whether a watchdog ran out since they were taken last.
     #[must_use]
     pub fn has_watchdog_expiries(&self) -> bool {
-        !self.core.expiries.is_empty()
+        !self.core.watchdogs.expiries.is_empty()
     }
 
     /// Watchdogs that ran out since the last call, the first ones of many.
     pub fn take_watchdog_expiries(&mut self) -> Vec<WatchdogExpiry> {
-        std::mem::take(&mut self.core.expiries)
+        std::mem::take(&mut self.core.watchdogs.expiries)
     }
 
     /// A coding switch is wired to the controller: its value stands at `address` from every start on.
@@ -106,7 +106,7 @@ impl Controller {
     /// The processor of the device has crashed and runs again from `at` on, without a reset of the
     /// controller.
     pub fn reboot_processor(&mut self, at: Instant, signals: &mut Signals) {
-        if !self.powered || !self.core.started {
+        if !self.powered || !self.core.startup.started {
             return;
         }
         self.core.set_processor_stuck(false, at);

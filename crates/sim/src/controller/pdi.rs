@@ -227,7 +227,7 @@ impl Pdi<'_> {
     /// reached by the MainDevice.
     #[must_use]
     pub fn sii_load_ok(&self) -> bool {
-        self.core.loaded
+        self.core.startup.loaded
     }
 
     /// Whether the MainDevice has handed the SII to this side (0x0500, bit 0).

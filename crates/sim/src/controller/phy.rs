@@ -279,7 +279,7 @@ impl Core {
     }
 
     pub(super) fn finish_phy(&mut self) {
-        let link = self.loops.links();
+        let link = self.ports.loops.links();
         self.phys.finish(&link, &mut self.memory);
     }
 
@@ -290,7 +290,7 @@ impl Core {
         if !implemented::watches_links_by_phy(&self.hardware) {
             return;
         }
-        let links = self.loops.links();
+        let links = self.ports.loops.links();
         for port in Port::ALL {
             let address = usize::from(r::PHY_PORT_STATUS.of_port(port).0);
             let value = match (self.hardware.ports[port], links[port]) {

@@ -3,10 +3,10 @@
 //! The wire decides who sees what (S1 14.1 and its counting profile); the controller
 //! decides what becomes of it: loops close, counters count or do not.
 
-use std::collections::VecDeque;
-
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
+
+use crate::event_queue::EventQueue;
 
 /// Something that happens at a port.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -52,11 +52,7 @@ pub enum CountKind {
     LostLink,
 }
 
-/// Events by time, those of the same instant in the order in which they were posted.
-#[derive(Clone, Default, Debug)]
-pub(super) struct Queue(VecDeque<(Instant, QueuedEvent)>);
-
-/// What the queue holds: what was posted, and what the controller reminds itself of.
+/// What the queue of a controller holds: what was posted, and what the controller reminds itself of.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum QueuedEvent {
     /// The wire said so.
@@ -65,53 +61,19 @@ pub(super) enum QueuedEvent {
     GoodFrame(Port),
 }
 
-impl Queue {
-    pub(super) fn push(&mut self, at: Instant, event: QueuedEvent) {
-        // Most events come in the order of time: look from the end.
-        let behind = self.0.iter().rev().take_while(|(other, _)| *other > at).count();
-        self.0.insert(self.0.len() - behind, (at, event));
-    }
-
-    pub(super) fn next_at(&self) -> Option<Instant> {
-        self.0.front().map(|(at, _)| *at)
-    }
-
-    /// When the next event comes that can open or close a loop.
-    pub(super) fn next_way_at(&self) -> Option<Instant> {
-        let ways = self.0.iter().find(|(_, event)| match event {
-            QueuedEvent::Posted(PortEvent::Count { .. }) => false,
-            QueuedEvent::Posted(PortEvent::Link { .. }) | QueuedEvent::GoodFrame(_) => true,
-        });
-        ways.map(|(at, _)| *at)
-    }
-
-    /// The next event, if it is not after `now`.
-    pub(super) fn pop_until(&mut self, now: Instant) -> Option<(Instant, QueuedEvent)> {
-        if self.next_at()? <= now { self.0.pop_front() } else { None }
-    }
-
-    /// What is to come until `now`, in order.
-    pub(super) fn until(&self, now: Instant) -> impl Iterator<Item = (Instant, QueuedEvent)> {
-        self.0.iter().take_while(move |(at, _)| *at <= now).copied()
+impl QueuedEvent {
+    /// Whether it can open or close a loop.
+    const fn can_move_loop(self) -> bool {
+        match self {
+            Self::Posted(PortEvent::Count { .. }) => false,
+            Self::Posted(PortEvent::Link { .. }) | Self::GoodFrame(_) => true,
+        }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn events_come_in_the_order_of_time_then_of_posting() {
-        let mut queue = Queue::default();
-        for (at, port) in [(5, Port::A), (9, Port::B), (5, Port::C), (1, Port::D)] {
-            queue.push(Instant::from_nanos(at), QueuedEvent::GoodFrame(port));
-        }
-        assert_eq!(queue.next_at(), Some(Instant::from_nanos(1)));
-        assert_eq!(queue.until(Instant::from_nanos(5)).count(), 3);
-        let order: Vec<QueuedEvent> =
-            std::iter::from_fn(|| queue.pop_until(Instant::from_nanos(8)).map(|(_, event)| event))
-                .collect();
-        assert_eq!(order, [Port::D, Port::A, Port::C].map(QueuedEvent::GoodFrame));
-        assert_eq!(queue.next_at(), Some(Instant::from_nanos(9)));
+impl EventQueue<QueuedEvent> {
+    /// When the next event comes that can open or close a loop.
+    pub(super) fn next_way_at(&self) -> Option<Instant> {
+        self.iter().find(|(_, event)| event.can_move_loop()).map(|(at, _)| at)
     }
 }

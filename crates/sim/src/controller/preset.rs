@@ -48,7 +48,7 @@ impl Controller {
             }
         }
         if range.contains(&(at(&r::DL_CONTROL) + 1)) {
-            core.loops.rewrite(DlControl(core.memory.u32(&r::DL_CONTROL)));
+            core.ports.loops.rewrite(DlControl(core.memory.u32(&r::DL_CONTROL)));
             core.refresh_dl_status();
         }
         core.refresh_irq();

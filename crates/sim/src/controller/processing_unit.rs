@@ -76,7 +76,7 @@ impl Core {
                 return self.finish(when, frame, false);
             }
         }
-        let closes_ring = self.loops.port_zero_closes_ring();
+        let closes_ring = self.ports.loops.port_zero_closes_ring();
         if closes_ring && frame.bytes.get(first_at + 7).is_some_and(|byte| byte & CIRCULATED != 0) {
             self.count(Port::A, CountKind::ProcessingUnitError, when);
             self.note_unit_error(Port::A, UnitError::Circulating);

@@ -4,7 +4,7 @@
 //! Reference: S2 2.9.7 (0x0314), 2.9.8 and table 12 (0x0320). ET1150 and IP core from 4.0.0 on have
 //! them.
 
-use linesman_proto::port::Port;
+use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register as r;
 use linesman_proto::time::Instant;
 
@@ -38,11 +38,32 @@ impl UnitError {
     }
 }
 
+/// Ends of the frames that came in at the ports, for a controller that keeps reasons of receive errors (0x0320).
+#[derive(Clone, Debug)]
+pub(super) struct RxReasons(Option<PortMap<Instant>>);
+
+impl RxReasons {
+    /// `are_kept` if the controller has the registers.
+    pub(super) fn new(are_kept: bool) -> Self {
+        Self(are_kept.then_some(PortMap([Instant::ZERO; 4])))
+    }
+
+    /// When the last frame of a port ends, to be set as one comes in; `None` where nobody keeps it.
+    #[inline]
+    pub(super) fn frame_ends(&mut self, port: Port) -> Option<&mut Instant> {
+        self.0.as_mut().map(|ends| &mut ends[port])
+    }
+
+    fn is_in_frame(&self, port: Port, when: Instant) -> bool {
+        self.0.as_ref().is_some_and(|ends| when < ends[port])
+    }
+}
+
 impl Core {
     /// A port saw an error.
     pub(super) fn note_rx_error(&mut self, port: Port, kind: CountKind, when: Instant) {
         let code = match kind {
-            CountKind::SymbolError if when < self.frame_until[port] => SYMBOL_IN_FRAME,
+            CountKind::SymbolError if self.rx_reasons.is_in_frame(port, when) => SYMBOL_IN_FRAME,
             CountKind::SymbolError => IDLE_SYMBOL,
             CountKind::InvalidFrame => CHECKSUM,
             CountKind::ForwardedError => FORWARDED,

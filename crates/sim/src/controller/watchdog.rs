@@ -34,7 +34,7 @@ const KEPT: usize = 256;
 
 /// One watchdog.
 #[derive(Clone, Copy, Default, Debug)]
-pub(super) struct Watchdog {
+struct Watchdog {
     expires: Option<Instant>,
     /// When it was triggered last.
     triggered: Instant,
@@ -42,7 +42,7 @@ pub(super) struct Watchdog {
 
 impl Watchdog {
     /// When it will expire, if it runs.
-    pub(super) fn expires(&self) -> Option<Instant> {
+    fn expires(&self) -> Option<Instant> {
         self.expires
     }
 
@@ -51,16 +51,16 @@ impl Watchdog {
         at.since(self.triggered)
     }
 
-    pub(super) fn is_running(&self) -> bool {
+    fn is_running(&self) -> bool {
         self.expires.is_some()
     }
 
-    pub(super) fn stop(&mut self) {
+    fn stop(&mut self) {
         self.expires = None;
     }
 
     /// Starts it anew. With time 0 it is off and never expires.
-    pub(super) fn trigger(
+    fn trigger(
         &mut self,
         at: Instant,
         ticks_since: Instant,
@@ -76,6 +76,60 @@ impl Watchdog {
     }
 }
 
+/// Both watchdogs of a controller.
+///
+/// That of the process data runs from the first outputs on. That of the processor runs only while the
+/// processor is stuck, and is not expired otherwise.
+#[derive(Clone, Debug)]
+pub(super) struct Watchdogs {
+    process_data: Watchdog,
+    pdi: Watchdog,
+    /// That of the processor is not expired.
+    pub(super) pdi_ok: bool,
+    /// Those that ran out, until somebody asks.
+    pub(super) expiries: Vec<WatchdogExpiry>,
+}
+
+impl Default for Watchdogs {
+    fn default() -> Self {
+        Self {
+            process_data: Watchdog::default(),
+            pdi: Watchdog::default(),
+            pdi_ok: true,
+            expiries: Vec::new(),
+        }
+    }
+}
+
+impl Watchdogs {
+    /// As after power-on: both stand, neither is expired. Expiries wait on for who asks.
+    pub(super) fn restart(&mut self) {
+        self.stop();
+        self.pdi_ok = true;
+    }
+
+    pub(super) fn stop(&mut self) {
+        self.process_data.stop();
+        self.pdi.stop();
+    }
+
+    /// When that of the process data will expire, if it runs.
+    pub(super) fn process_data_expires(&self) -> Option<Instant> {
+        self.process_data.expires()
+    }
+
+    /// When that of the processor will expire, if it runs.
+    pub(super) fn pdi_expires(&self) -> Option<Instant> {
+        self.pdi.expires()
+    }
+
+    fn note_expiry(&mut self, kind: WatchdogKind, at: Instant, silence: Span) {
+        if self.expiries.len() < KEPT {
+            self.expiries.push(WatchdogExpiry { kind, at, silence });
+        }
+    }
+}
+
 impl Core {
     fn divider(&self) -> WatchdogDivider {
         WatchdogDivider(self.memory.u16(&r::WATCHDOG_DIVIDER))
@@ -85,14 +139,14 @@ impl Core {
     pub(super) fn trigger_process_data_watchdog(&mut self, when: Instant) {
         let time = WatchdogTime(self.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA));
         let divider = self.divider();
-        self.process_data_watchdog.trigger(when, self.powered_at, divider, time);
+        self.watchdogs.process_data.trigger(when, self.startup.powered_at, divider, time);
         self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 1);
     }
 
     pub(super) fn expire_process_data_watchdog(&mut self, when: Instant) {
-        let silence = self.process_data_watchdog.silence(when);
-        self.note_expiry(WatchdogKind::ProcessData, when, silence);
-        self.process_data_watchdog.stop();
+        let silence = self.watchdogs.process_data.silence(when);
+        self.watchdogs.note_expiry(WatchdogKind::ProcessData, when, silence);
+        self.watchdogs.process_data.stop();
         self.memory.set_u16(&r::WATCHDOG_STATUS_PROCESS_DATA, 0);
         self.increment(r::WATCHDOG_COUNTER_PROCESS_DATA.address);
         self.raise_al_events(r::AlEvents::PROCESS_DATA_WATCHDOG, when);
@@ -102,7 +156,7 @@ impl Core {
     /// expired" (S2 2.10.5).
     pub(super) fn retime_watchdogs(&mut self, when: Instant) {
         let off = self.memory.u16(&r::WATCHDOG_TIME_PROCESS_DATA) == 0;
-        if off || self.process_data_watchdog.is_running() {
+        if off || self.watchdogs.process_data.is_running() {
             self.trigger_process_data_watchdog(when);
         }
         self.retime_pdi_watchdog(when);
@@ -120,30 +174,24 @@ impl Core {
 
     /// While it is served, the PDI watchdog is triggered all the time.
     pub(super) fn retime_pdi_watchdog(&mut self, when: Instant) {
-        self.pdi_watchdog.stop();
+        self.watchdogs.pdi.stop();
         let time = WatchdogTime(self.memory.u16(&r::WATCHDOG_TIME_PDI));
-        if self.processor_stuck && self.pdi_watchdog_ok {
+        if self.processor_stuck && self.watchdogs.pdi_ok {
             let divider = self.divider();
-            self.pdi_watchdog.trigger(when, self.powered_at, divider, time);
+            self.watchdogs.pdi.trigger(when, self.startup.powered_at, divider, time);
         }
         let served = !self.processor_stuck && self.memory.u8(&r::PDI_CONTROL) != 0;
         if served || time == WatchdogTime::OFF {
-            self.pdi_watchdog_ok = true;
+            self.watchdogs.pdi_ok = true;
             self.refresh_dl_status();
         }
     }
 
-    fn note_expiry(&mut self, kind: WatchdogKind, at: Instant, silence: Span) {
-        if self.expiries.len() < KEPT {
-            self.expiries.push(WatchdogExpiry { kind, at, silence });
-        }
-    }
-
     pub(super) fn expire_pdi_watchdog(&mut self, when: Instant) {
-        let silence = self.pdi_watchdog.silence(when);
-        self.note_expiry(WatchdogKind::Pdi, when, silence);
-        self.pdi_watchdog.stop();
-        self.pdi_watchdog_ok = false;
+        let silence = self.watchdogs.pdi.silence(when);
+        self.watchdogs.note_expiry(WatchdogKind::Pdi, when, silence);
+        self.watchdogs.pdi.stop();
+        self.watchdogs.pdi_ok = false;
         self.increment(r::WATCHDOG_COUNTER_PDI.address);
         self.refresh_dl_status();
     }

@@ -10,6 +10,7 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::sii::word;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::wiring::ports_after;
+use linesman_proto::topology::{Link, Tree};
 
 use super::port_swap::swap_ports;
 use super::{DeviceInfo, Segment, build_deviations, identification, signal_wires};
@@ -21,6 +22,7 @@ use crate::hardware::PortKind;
 use crate::seed::Seed;
 use crate::segment_file::{self, Planned, SegmentFile, SegmentFileError, TypeError};
 use crate::truth::Effect;
+use crate::wire::Medium;
 use crate::wire::plug_noise::PlugNoise;
 use crate::wire::world::World;
 
@@ -144,60 +146,17 @@ fn assemble(
     let mut devices = Vec::with_capacity(placed.len());
     let mut made = Vec::with_capacity(placed.len());
     for one in &placed {
-        // What is planned has as many parts as its type.
-        let Some(mut built) = build_one(one, &mut signals) else { continue };
-        if let Some(revision) = one.revision {
-            set_revision(&mut built.sii, revision);
-        }
-        let id = file.devices[one.planned.device].id.filter(|_| one.planned.part == 0);
-        let identification = identification::set(&mut built, id, &mut signals);
-        let first = one.planned.part == 0 && one.planned.copy == 0;
-        let said = file.devices[one.planned.device].alias.filter(|_| first);
-        if let Some(alias) = one.alias.or(said) {
-            identification::set_alias(&mut built.sii, alias);
-        }
-        let clock = clock(file, &one.planned, seed);
-        let place = file.devices[one.planned.device].sii.unwrap_or_default();
-        if place.needs_processor() && !built.firmware.has_processor() {
-            return Err(BuildError::NoProcessor {
-                device: one.planned.name.clone(),
-                place: place.name(),
-                type_name: one.planned.kind.name().to_owned(),
-            });
-        }
-        let Built { mut hardware, sii, firmware, outputs, inputs } = place.apply(built);
-        let counts = file.devices[one.planned.device].counts_forwarded.or(file.counts_forwarded);
-        hardware.counting.forwarded = counts.unwrap_or(hardware.counting.forwarded);
-        let remakes = file.devices[one.planned.device].remakes_symbol_errors;
-        let counting = &mut hardware.counting;
-        counting.remakes_symbol_errors = remakes.unwrap_or(counting.remakes_symbol_errors);
-        let mut controller = Controller::new(one.id, kinds.get(hardware), clock, firmware, sii);
-        identification.finish(&mut controller);
+        let Some((controller, device)) = make(file, one, seed, &mut signals, &mut kinds)? else {
+            continue;
+        };
         made.push(controller);
-        devices.push(DeviceInfo { outputs, inputs });
+        devices.push(device);
     }
     build_deviations::move_wiring(&placed, &mut devices);
     signal_wires::lay(file, &names, &placed, &devices, &mut signals)?;
-    let cable_m: Vec<f64> = tree
-        .links()
-        .iter()
-        .map(|link| match link.downstream.node() {
-            Some(node) => placed[node].planned.cable_m,
-            None => {
-                let ring = file.ring.as_ref().and_then(|ring| ring.cable_m);
-                ring.unwrap_or(segment_file::DEFAULT_CABLE_M)
-            }
-        })
-        .collect();
-    let mut world = World::new(&tree, made, &cable_m, signals);
+    let mut world = World::new(&tree, made, &cable_lengths(file, &placed, &tree), signals);
     for (wired, link) in tree.links().iter().zip(&mut world.links) {
-        // A device of several controllers has a cable to its first only.
-        let medium = match wired.downstream.node().map(|node| &placed[node].planned) {
-            Some(planned) if planned.part == 0 => file.devices[planned.device].medium,
-            Some(_) => None,
-            None => file.ring.as_ref().and_then(|ring| ring.medium),
-        };
-        link.medium = medium.unwrap_or_default();
+        link.medium = medium(file, &placed, wired);
     }
     world.plug_noise =
         PlugNoise::new(file.noise_at_link_up.unwrap_or(0.0), seed.stream("plug noise"));
@@ -213,20 +172,87 @@ fn assemble(
     if file.old_counters {
         age(&mut segment);
     }
-    for one in &placed {
-        for (key, value) in &file.devices[one.planned.device].counters {
-            if let Some(counter) =
-                segment_file::parse_counter(key).filter(|_| one.planned.part == 0)
-            {
-                segment.set_counter(one.id, counter, *value);
-            }
-        }
-    }
+    set_counters(&mut segment, file, &placed);
     for (index, entry) in file.faults.iter().enumerate() {
         schedule(&mut segment, &label(index), entry)?;
     }
     segment.advance(Instant::ZERO);
     Ok(segment)
+}
+
+/// The controller in a place, with all that the file says of it; `None` where its type has not so many parts.
+fn make(
+    file: &SegmentFile,
+    one: &Placed,
+    seed: Seed,
+    signals: &mut Signals,
+    kinds: &mut ControllerKinds,
+) -> Result<Option<(Controller, DeviceInfo)>, BuildError> {
+    let device = &file.devices[one.planned.device];
+    // What is planned has as many parts as its type.
+    let Some(mut built) = build_one(one, signals) else { return Ok(None) };
+    if let Some(revision) = one.revision {
+        set_revision(&mut built.sii, revision);
+    }
+    let id = device.id.filter(|_| one.planned.part == 0);
+    let identification = identification::set(&mut built, id, signals);
+    let first = one.planned.part == 0 && one.planned.copy == 0;
+    let said = device.alias.filter(|_| first);
+    if let Some(alias) = one.alias.or(said) {
+        identification::set_alias(&mut built.sii, alias);
+    }
+    let clock = clock(file, &one.planned, seed);
+    let place = device.sii.unwrap_or_default();
+    if place.needs_processor() && !built.firmware.has_processor() {
+        return Err(BuildError::NoProcessor {
+            device: one.planned.name.clone(),
+            place: place.name(),
+            type_name: one.planned.kind.name().to_owned(),
+        });
+    }
+    let Built { mut hardware, sii, firmware, outputs, inputs } = place.apply(built);
+    let counting = &mut hardware.counting;
+    let counts = device.counts_forwarded.or(file.counts_forwarded);
+    counting.forwarded = counts.unwrap_or(counting.forwarded);
+    counting.remakes_symbol_errors =
+        device.remakes_symbol_errors.unwrap_or(counting.remakes_symbol_errors);
+    let mut controller = Controller::new(one.id, kinds.get(hardware), clock, firmware, sii);
+    identification.finish(&mut controller);
+    Ok(Some((controller, DeviceInfo { outputs, inputs })))
+}
+
+/// Lengths of the cables, in m, in the order of the tree's links.
+fn cable_lengths(file: &SegmentFile, placed: &[Placed], tree: &Tree) -> Vec<f64> {
+    let length = |link: &Link| match link.downstream.node() {
+        Some(node) => placed[node].planned.cable_m,
+        None => {
+            let ring = file.ring.as_ref().and_then(|ring| ring.cable_m);
+            ring.unwrap_or(segment_file::DEFAULT_CABLE_M)
+        }
+    };
+    tree.links().iter().map(length).collect()
+}
+
+/// The medium of a link.
+fn medium(file: &SegmentFile, placed: &[Placed], wired: &Link) -> Medium {
+    // A device of several controllers has a cable to its first only.
+    let medium = match wired.downstream.node().map(|node| &placed[node].planned) {
+        Some(planned) if planned.part == 0 => file.devices[planned.device].medium,
+        Some(_) => None,
+        None => file.ring.as_ref().and_then(|ring| ring.medium),
+    };
+    medium.unwrap_or_default()
+}
+
+/// Error counters start as the file says.
+fn set_counters(segment: &mut Segment, file: &SegmentFile, placed: &[Placed]) {
+    for one in placed.iter().filter(|one| one.planned.part == 0) {
+        for (key, value) in &file.devices[one.planned.device].counters {
+            if let Some(counter) = segment_file::parse_counter(key) {
+                segment.set_counter(one.id, counter, *value);
+            }
+        }
+    }
 }
 
 fn schedule(

@@ -6,12 +6,11 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::Tree;
 
-use super::arrivals::Arrivals;
 use super::tx_capture::TxCapture;
-use super::tx_delay::DelayedFrames;
 use super::{DeviceInfo, FrameTally, Segment};
 use crate::controller::Controller;
 use crate::device::Signals;
+use crate::event_queue::EventQueue;
 use crate::seed::Seed;
 use crate::wire::world::World;
 
@@ -58,11 +57,11 @@ impl Segment {
             names,
             world,
             now: Instant::ZERO,
-            arrivals: Arrivals::default(),
+            arrivals: EventQueue::default(),
             unplugged: BTreeMap::new(),
             strange: BTreeSet::new(),
             spare: Vec::new(),
-            waiting: DelayedFrames::default(),
+            waiting: EventQueue::default(),
             tx_capture: TxCapture::default(),
             tally: FrameTally::default(),
         }

@@ -4,7 +4,6 @@
 //! at one ([`Segment::poll_arrival`]). Time is an argument and never goes back; nothing happens
 //! between two calls that does not depend on them alone, so the same calls give the same bytes.
 
-mod arrivals;
 mod build;
 mod build_deviations;
 pub(crate) mod card;
@@ -29,9 +28,9 @@ pub use card::{FrameTally, HostPort};
 pub use plug::PlugError;
 pub use tx_capture::Outgoing;
 
-use self::arrivals::Arrivals;
 use crate::controller::{Controller, WatchdogKind};
 use crate::device::{SignalId, Signals};
+use crate::event_queue::EventQueue;
 use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
@@ -77,14 +76,15 @@ pub struct Segment {
     /// Names of all devices that were planned.
     names: Vec<String>,
     now: Instant,
-    arrivals: Arrivals,
+    /// Frames on their way to a card.
+    arrivals: EventQueue<(Path, WireFrame)>,
     /// Nodes whose cable was pulled, and the open link that this is.
     unplugged: BTreeMap<usize, FaultId>,
     /// Numbers of frames among them that foreign senders sent.
     strange: BTreeSet<u64>,
     spare: Vec<Vec<u8>>,
-    /// Frames that leave later.
-    waiting: tx_delay::DelayedFrames,
+    /// Frames that wait in the cards, by the time at which they leave.
+    waiting: EventQueue<tx_delay::DelayedFrame>,
     /// Frames that go out, for who listens.
     tx_capture: tx_capture::TxCapture,
     tally: FrameTally,
@@ -161,7 +161,7 @@ impl Segment {
         card.tx_delay.sends(leaves, duration);
         let mut in_transit = FrameInTransit::new(frame);
         match self.world.carry(path, leaves, &mut in_transit) {
-            Outcome::Arrived(path, at) => self.arrivals.push(at, path, in_transit.frame),
+            Outcome::Arrived(path, at) => self.arrivals.push(at, (path, in_transit.frame)),
             Outcome::Vanished => {
                 self.tally.vanished += 1;
                 self.recycle(in_transit.frame.bytes);
@@ -180,7 +180,7 @@ impl Segment {
     fn take_foreign_frames(&mut self) {
         for (at, path, frame) in self.world.take_foreign_frames() {
             self.strange.insert(frame.number);
-            self.arrivals.push(at, path, frame);
+            self.arrivals.push(at, (path, frame));
         }
     }
 
@@ -188,7 +188,7 @@ impl Segment {
     /// [`Segment::handle_frame`]); its bytes replace those in `buffer`.
     pub fn poll_arrival(&mut self, buffer: &mut Vec<u8>) -> Option<Arrival> {
         loop {
-            let (at, path, mut frame) = self.arrivals.pop_until(self.now)?;
+            let (at, (path, mut frame)) = self.arrivals.pop_until(self.now)?;
             let intact = frame.damage.is_intact();
             let kept = self.receive(at, path, &frame);
             if kept {
@@ -237,7 +237,8 @@ impl Segment {
     /// made up for, in its order, by the next one.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Instant> {
-        let due = [self.arrivals.next_at(), self.next_leaves(), self.world.next_foreign_frame()];
+        let due =
+            [self.arrivals.next_at(), self.waiting.next_at(), self.world.next_foreign_frame()];
         due.into_iter().flatten().min()
     }
 

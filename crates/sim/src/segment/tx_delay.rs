@@ -42,14 +42,9 @@ impl TxDelay {
     }
 }
 
-/// Frames that wait in the cards, by the time at which they leave.
-#[derive(Clone, Default, Debug)]
-pub(super) struct DelayedFrames(VecDeque<DelayedFrame>);
-
-/// A frame that waits.
+/// A frame that waits in a card until it leaves.
 #[derive(Clone, Debug)]
-struct DelayedFrame {
-    leaves: Instant,
+pub(super) struct DelayedFrame {
     path: Path,
     /// Whether who listens was shown it: it has come to the card.
     was_captured: bool,
@@ -139,27 +134,16 @@ impl Segment {
         let mut bytes = self.spare.pop().unwrap_or_default();
         bytes.clear();
         bytes.extend_from_slice(frame);
-        let waiting = &mut self.waiting.0;
-        let before = waiting.iter().take_while(|other| other.leaves <= leaves).count();
-        waiting.insert(before, DelayedFrame { leaves, path, was_captured, bytes });
+        self.waiting.push(leaves, DelayedFrame { path, was_captured, bytes });
         true
     }
 
     /// Sends what was kept back until now.
     #[inline]
     pub(super) fn send_kept_back(&mut self, now: Instant) {
-        while self.waiting.0.front().is_some_and(|kept| kept.leaves <= now) {
-            if let Some(DelayedFrame { leaves, path, was_captured, bytes }) =
-                self.waiting.0.pop_front()
-            {
-                self.send(leaves, path, &bytes, was_captured);
-                self.recycle(bytes);
-            }
+        while let Some((leaves, kept)) = self.waiting.pop_until(now) {
+            self.send(leaves, kept.path, &kept.bytes, kept.was_captured);
+            self.recycle(kept.bytes);
         }
-    }
-
-    /// When the next frame that was kept back leaves.
-    pub(super) fn next_leaves(&self) -> Option<Instant> {
-        self.waiting.0.front().map(|kept| kept.leaves)
     }
 }

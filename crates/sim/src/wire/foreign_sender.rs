@@ -5,8 +5,6 @@
 //! destroy what is not EtherCAT or let it pass (DL control bit 0, S1 3.2). What comes back goes to
 //! the card, too, as a switch sends broadcasts to all its ports.
 
-use std::collections::BTreeMap;
-
 use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::ethernet::{MIN_LEN, MacAddress};
@@ -18,6 +16,7 @@ use linesman_proto::time::Instant;
 use super::change::DirectedLink;
 use super::walk::{FrameInTransit, Outcome};
 use super::world::World;
+use crate::event_queue::EventQueue;
 use crate::frame::{Damage, WireFrame};
 use crate::truth::{Effect, FaultId};
 
@@ -120,9 +119,7 @@ fn foreign(ethertype: u16, payload: &[u8]) -> Vec<u8> {
 /// Frames of foreign senders: those that are to be sent, and those that came back.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct ForeignSenders {
-    /// By time, then in the order in which they were scheduled.
-    waiting: BTreeMap<(Instant, u64), (FaultId, DirectedLink, ForeignSender)>,
-    count: u64,
+    waiting: EventQueue<(FaultId, DirectedLink, ForeignSender)>,
     /// Until when the last one is on its line.
     until: Option<(DirectedLink, Instant)>,
     back: Vec<(Instant, Path, WireFrame)>,
@@ -136,17 +133,16 @@ impl ForeignSenders {
         direction: DirectedLink,
         what: ForeignSender,
     ) {
-        self.count += 1;
-        self.waiting.insert((at, self.count), (fault, direction, what));
+        self.waiting.push(at, (fault, direction, what));
     }
 
     #[inline]
     pub(super) fn next_at(&self) -> Option<Instant> {
-        self.waiting.first_key_value().map(|((at, _), _)| *at)
+        self.waiting.next_at()
     }
 
     pub(super) fn disarm(&mut self, fault: FaultId) {
-        self.waiting.retain(|_, (by, ..)| *by != fault);
+        self.waiting.retain(|(by, ..)| *by != fault);
     }
 }
 
@@ -154,12 +150,8 @@ impl World {
     /// Foreign senders send what is due by `now`. Frames that are on the way together are carried in the
     /// order in which they were sent.
     pub(super) fn send_foreign_frames(&mut self, now: Instant) {
-        while self.foreign_senders.next_at().is_some_and(|at| at <= now) {
-            let Some(((at, _), (fault, direction, what))) =
-                self.foreign_senders.waiting.pop_first()
-            else {
-                return;
-            };
+        while let Some((at, (fault, direction, what))) = self.foreign_senders.waiting.pop_until(now)
+        {
             self.note_entries();
             self.frames += 1;
             let number = self.frames;

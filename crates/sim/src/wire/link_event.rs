@@ -1,7 +1,5 @@
 //! Link events: detection times, loss of signal, link up.
 
-use std::collections::BTreeMap;
-
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
@@ -27,33 +25,6 @@ pub(super) enum LinkEvent {
     Carries { link: usize, fault: FaultId },
     /// A PHY does something to its link.
     Phy { link: usize, end: usize, act: PhyAction },
-}
-
-/// What is due, by time; of the same instant in the order in which it was scheduled.
-#[derive(Clone, Default, Debug)]
-pub(super) struct LinkEvents {
-    due: BTreeMap<(Instant, u64), LinkEvent>,
-    next: u64,
-}
-
-impl LinkEvents {
-    pub(super) fn push(&mut self, at: Instant, due: LinkEvent) {
-        self.due.insert((at, self.next), due);
-        self.next += 1;
-    }
-
-    #[inline]
-    pub(super) fn is_empty(&self) -> bool {
-        self.due.is_empty()
-    }
-
-    pub(super) fn next_at(&self) -> Option<Instant> {
-        self.due.first_key_value().map(|((at, _), _)| *at)
-    }
-
-    pub(super) fn pop(&mut self) -> Option<(Instant, LinkEvent)> {
-        self.due.pop_first().map(|((at, _), due)| (at, due))
-    }
 }
 
 impl World {

@@ -15,6 +15,7 @@ use super::software::ActiveSoftwareChange;
 use super::timing::ActiveTimingChange;
 use crate::controller::Controller;
 use crate::device::{Refusal, Signals, SoftwareFault};
+use crate::event_queue::EventQueue;
 use crate::truth::FaultId;
 
 /// What happens to a controller and cannot be posted to it.
@@ -67,8 +68,7 @@ pub(crate) struct Node {
     pub(super) software: Vec<ActiveSoftwareChange>,
     /// What faults have done to its clock and deadlines.
     pub(super) timing: Vec<ActiveTimingChange>,
-    /// In the order of time.
-    acts: VecDeque<(Instant, NodeAction)>,
+    acts: EventQueue<NodeAction>,
     /// What the book of all nodes keeps of it.
     pub(super) entry: Entry,
     /// The last frame that had a datagram for it.
@@ -89,21 +89,20 @@ impl Node {
             former_address: None,
             software: Vec::new(),
             timing: Vec::new(),
-            acts: VecDeque::new(),
+            acts: EventQueue::default(),
             entry: Entry::default(),
             last_frame: 0,
         }
     }
 
     pub(super) fn act_at(&mut self, at: Instant, act: NodeAction) {
-        self.acts.push_back((at, act));
+        self.acts.push(at, act);
     }
 
     /// Brings the controller to an instant, with all that happens to it on the way.
     #[inline]
     pub(super) fn touch(&mut self, now: Instant, signals: &mut Signals) {
-        while let Some((at, act)) = self.acts.front().copied().filter(|(at, _)| *at <= now) {
-            self.acts.pop_front();
+        while let Some((at, act)) = self.acts.pop_until(now) {
             self.controller.advance(at, signals);
             match act {
                 NodeAction::Off => self.controller.power_off(at),
@@ -147,13 +146,13 @@ impl Node {
     /// When something happens to it by itself; [`Instant::MAX`] for never.
     #[inline]
     pub(super) fn next_event(&self) -> Instant {
-        let act = self.acts.front().map_or(Instant::MAX, |(at, _)| *at);
+        let act = self.acts.next_at().unwrap_or(Instant::MAX);
         self.controller.next_event().unwrap_or(Instant::MAX).min(act)
     }
 
     /// When something happens that can lead frames another way.
     pub(super) fn next_way_event(&self) -> Instant {
-        let act = self.acts.front().map_or(Instant::MAX, |(at, _)| *at);
+        let act = self.acts.next_at().unwrap_or(Instant::MAX);
         self.controller.next_way_event().unwrap_or(Instant::MAX).min(act)
     }
 

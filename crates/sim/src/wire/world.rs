@@ -8,11 +8,12 @@ use super::change::{Change, DirectedLink};
 use super::fast_path::FastPath;
 use super::foreign_sender::ForeignSenders;
 use super::link::{CABLE_NS_PER_M, Link, Noise};
-use super::link_event::LinkEvents;
+use super::link_event::LinkEvent;
 use super::nodes::Nodes;
 use super::plug_noise::PlugNoise;
 use crate::controller::Controller;
 use crate::device::Signals;
+use crate::event_queue::EventQueue;
 use crate::fault::Running;
 use crate::hardware::PortKind;
 use crate::seed::Seed;
@@ -32,7 +33,7 @@ pub(crate) struct World {
     pub(crate) cards: [Card; 2],
     pub(crate) signals: Signals,
     pub(crate) truth: TruthLog,
-    pub(super) link_events: LinkEvents,
+    pub(super) link_events: EventQueue<LinkEvent>,
     pub(crate) running: Vec<Running>,
     /// The line that leaves each card.
     pub(super) leaving: [Option<DirectedLink>; 2],
@@ -67,7 +68,7 @@ impl World {
             cards: [Card::default(), Card::default()],
             signals,
             truth: TruthLog::default(),
-            link_events: LinkEvents::default(),
+            link_events: EventQueue::default(),
             running: Vec::new(),
             leaving: [None; 2],
             horizon: Instant::ZERO,
@@ -270,7 +271,7 @@ impl World {
                 (Some(at), Some((fault_at, index))) if fault_at < at => self.run_fault(index),
                 (None, Some((_, index))) => self.run_fault(index),
                 (Some(_), _) => {
-                    if let Some((at, due)) = self.link_events.pop() {
+                    if let Some((at, due)) = self.link_events.pop_until(until) {
                         self.serve(at, due);
                     }
                 }

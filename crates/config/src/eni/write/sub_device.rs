@@ -187,8 +187,17 @@ fn settings(xml: &mut Xml, device: &DevicePlan) {
     }
 }
 
+/// Commands that a MainDevice sends to one SubDevice on its transitions.
+struct InitCommands<'a> {
+    xml: &'a mut Xml,
+    device: &'a DevicePlan,
+    /// How it is reached before it has its station address.
+    first: Target,
+    /// How it is reached from then on.
+    by_station: Target,
+}
+
 fn init_commands(xml: &mut Xml, device: &DevicePlan, position: u16) {
-    // How it is reached before it has its station address, and from then on.
     let first = match (device.settings.addressing, device.settings.alias) {
         (AddressingChoice::Alias, Some(alias)) => Target::Station(alias.0),
         (AddressingChoice::Alias | AddressingChoice::Auto | AddressingChoice::Position, _) => {
@@ -199,87 +208,114 @@ fn init_commands(xml: &mut Xml, device: &DevicePlan, position: u16) {
         AddressingChoice::Position => first,
         AddressingChoice::Auto | AddressingChoice::Alias => Target::Station(device.station.0),
     };
-    // A device that only mirrors AL control must not see the acknowledge bit.
-    let acknowledge = if device.device_emulation { 0x00 } else { 0x10 };
-    let state = |xml: &mut Xml, name: &str, transitions: &[&str], target: Target, value: u8| {
+    let mut commands = InitCommands { xml, device, first, by_station };
+    commands.state("INIT", &["IP", "PI", "SI", "OI"], first, 1);
+    identity(commands.xml, device, first);
+    commands.station_address();
+    commands.watchdogs();
+    commands.mailbox();
+    commands.process_data();
+    commands.clock();
+    for start_up in &device.start_up {
+        if let StartUpAction::RegisterWrite { address, data } = &start_up.action {
+            commands.set(&start_up.comment, &start_up.transition.letters(), *address, data);
+        }
+    }
+    commands.state("PREOP", &["IP", "SP", "OP"], by_station, 2);
+    commands.state("SAFEOP", &["PS", "OS"], by_station, 4);
+    commands.state("OP", &["SO"], by_station, 8);
+}
+
+impl InitCommands<'_> {
+    /// Orders a state, and waits for it.
+    fn state(&mut self, name: &str, transitions: &[&str], target: Target, value: u8) {
+        // A device that only mirrors AL control must not see the acknowledge bit.
+        let acknowledge = if self.device.device_emulation || value > 2 { 0x00 } else { 0x10 };
         let (write, read) = target.commands();
         let ask = format!("set device state to {name}");
         let ask = Init { counted: true, ..Init::new(&ask, transitions, target, 0x0120) };
-        let acknowledge = if value <= 2 { acknowledge } else { 0 };
-        command(xml, &ask, write, &[value | acknowledge, 0]);
+        command(self.xml, &ask, write, &[value | acknowledge, 0]);
         let check = format!("check device state for {name}");
         let check = Init {
             validate: Some((vec![value, 0], vec![0x1F, 0], PATIENCE_MS)),
             ..Init::new(&check, transitions, target, 0x0130)
         };
-        command(xml, &check, read, &[0; 2]);
-    };
-    state(xml, "INIT", &["IP", "PI", "SI", "OI"], first, 1);
-    identity(xml, device, first);
-    if device.settings.addressing != AddressingChoice::Position {
-        let station = Init::new("set station address", &["IP"], first, 0x0010);
-        let (write_first, _) = first.commands();
-        command(xml, &station, write_first, &device.station.0.to_le_bytes());
+        command(self.xml, &check, read, &[0; 2]);
     }
-    let (write, _) = by_station.commands();
-    let mut set = |comment: &str, transition: &str, register: RegisterAddress, data: &[u8]| {
+
+    /// Writes a register by the station address.
+    fn set(&mut self, comment: &str, transition: &str, register: RegisterAddress, data: &[u8]) {
+        let (write, _) = self.by_station.commands();
         let transitions = [transition];
-        let init = Init::new(comment, &transitions, by_station, register.0);
-        command(xml, &Init { counted: true, ..init }, write, data);
-    };
-    let watchdog = device.settings.watchdog;
-    for (comment, register, value) in [
-        ("set watchdog divider", 0x0400, watchdog.divider),
-        ("set PDI watchdog", 0x0410, watchdog.pdi),
-        ("set process data watchdog", 0x0420, watchdog.process_data),
-    ] {
-        if let Some(value) = value {
-            set(comment, "IP", RegisterAddress(register), &value.to_le_bytes());
+        let init = Init::new(comment, &transitions, self.by_station, register.0);
+        command(self.xml, &Init { counted: true, ..init }, write, data);
+    }
+
+    fn station_address(&mut self) {
+        if self.device.settings.addressing == AddressingChoice::Position {
+            return;
+        }
+        let station = Init::new("set station address", &["IP"], self.first, 0x0010);
+        let (write, _) = self.first.commands();
+        command(self.xml, &station, write, &self.device.station.0.to_le_bytes());
+    }
+
+    fn watchdogs(&mut self) {
+        let watchdog = self.device.settings.watchdog;
+        for (comment, register, value) in [
+            ("set watchdog divider", 0x0400, watchdog.divider),
+            ("set PDI watchdog", 0x0410, watchdog.pdi),
+            ("set process data watchdog", 0x0420, watchdog.process_data),
+        ] {
+            if let Some(value) = value {
+                self.set(comment, "IP", RegisterAddress(register), &value.to_le_bytes());
+            }
         }
     }
-    if let Some(mailbox) = &device.mailbox {
+
+    fn mailbox(&mut self) {
+        let Some(mailbox) = &self.device.mailbox else { return };
         let areas = [mailbox.areas.receive, mailbox.areas.send];
         let controls = [SmControl::MAILBOX_OUT, SmControl::MAILBOX_IN];
         for ((area, control), index) in areas.into_iter().zip(controls).zip(0..) {
             if let Some(at) = SYNC_MANAGER.at(index) {
                 let manager = SyncManagerConfig::enabled(area.offset, area.size, control);
-                set(&format!("set SM {index} (mailbox)"), "IP", at, &manager.to_bytes());
+                self.set(&format!("set SM {index} (mailbox)"), "IP", at, &manager.to_bytes());
             }
         }
     }
-    let mut fmmu = |index: u8, fmmu: &FmmuConfig, transition: &str| {
+
+    fn process_data(&mut self) {
+        let device = self.device;
+        if let Some((index, state)) = &device.mailbox_state {
+            self.fmmu(*index, state, "IP");
+        }
+        for (index, config) in &device.fmmus {
+            self.fmmu(*index, config, "PS");
+        }
+        for (index, manager) in &device.sync_managers {
+            if let Some(at) = SYNC_MANAGER.at(u16::from(*index)) {
+                self.set(&format!("set SM {index}"), "PS", at, &manager.to_bytes());
+            }
+        }
+    }
+
+    fn fmmu(&mut self, index: u8, fmmu: &FmmuConfig, transition: &str) {
         if let Some(at) = FMMU.at(u16::from(index)) {
-            set(&format!("set FMMU {index}"), transition, at, &fmmu.to_bytes());
-        }
-    };
-    if let Some((index, state)) = &device.mailbox_state {
-        fmmu(*index, state, "IP");
-    }
-    for (index, config) in &device.fmmus {
-        fmmu(*index, config, "PS");
-    }
-    for (index, manager) in &device.sync_managers {
-        if let Some(at) = SYNC_MANAGER.at(u16::from(*index)) {
-            set(&format!("set SM {index}"), "PS", at, &manager.to_bytes());
+            self.set(&format!("set FMMU {index}"), transition, at, &fmmu.to_bytes());
         }
     }
-    if let Some(clock) = &device.settings.clock {
+
+    fn clock(&mut self) {
+        let Some(clock) = &self.device.settings.clock else { return };
         let cycle = |span: linesman_proto::time::Span| {
             u32::try_from(span.as_nanos()).unwrap_or(u32::MAX).to_le_bytes()
         };
         let cycles = [cycle(clock.sync0_cycle), cycle(clock.sync1_cycle)].concat();
-        set("set DC cycle time", "PS", RegisterAddress(0x09A0), &cycles);
+        self.set("set DC cycle time", "PS", RegisterAddress(0x09A0), &cycles);
         let activation = clock.assign_activate.to_le_bytes();
-        set("set DC activation", "PS", RegisterAddress(0x0980), &activation);
+        self.set("set DC activation", "PS", RegisterAddress(0x0980), &activation);
     }
-    for start_up in &device.start_up {
-        if let StartUpAction::RegisterWrite { address, data } = &start_up.action {
-            set(&start_up.comment, &start_up.transition.letters(), *address, data);
-        }
-    }
-    state(xml, "PREOP", &["IP", "SP", "OP"], by_station, 2);
-    state(xml, "SAFEOP", &["PS", "OS"], by_station, 4);
-    state(xml, "OP", &["SO"], by_station, 8);
 }
 
 /// Reads the identity from the SII and compares it.

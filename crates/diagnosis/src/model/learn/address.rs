@@ -93,7 +93,7 @@ impl Addresses {
         passed: u16,
         is_confirmed: bool,
     ) {
-        if !self.doubt.is_believed(passed, model.traffic.positions_seen, is_confirmed) {
+        if !self.doubt.is_believed(passed, model.traffic.broadcasts.positions(), is_confirmed) {
             return;
         }
         let Some(card) = card else { return self.count(model, passed) };
@@ -131,7 +131,7 @@ impl Addresses {
             return;
         }
         self.present = Some(passed);
-        model.traffic.positions_seen = model.traffic.positions_seen.max(passed);
+        model.traffic.broadcasts.record_positions(passed);
         let passed = usize::from(passed).min(MOST_DEVICES);
         while self.order.len() < passed {
             // Those that answered to a station before any position was known come first, and those that come back have
@@ -348,7 +348,7 @@ impl Addresses {
         let since = answer.at.before(AWAY_WITHIN);
         let asked_in_vain = self.unanswered.contains_key(&station);
         self.give(model, id, station);
-        let is_running = !model.cyclic.is_empty() || model.traffic.lost_logical > 0;
+        let is_running = !model.cyclic.is_empty() || model.traffic.datagrams.lost_logical() > 0;
         if let Some(device) = model.device_mut(id).filter(|_| is_running && station != SET_ASIDE) {
             // While a line runs addresses are given to those that have lost theirs.
             let was_away = device.last_unanswered.is_some_and(|last| last >= since);

@@ -21,7 +21,7 @@ pub use address::Addresses;
 use answer::{Answer, answers};
 use count::CountDoubt;
 
-use super::{CountRise, Cyclic, Device, NetworkModel, Seen, SharedBy};
+use super::{Cyclic, Device, NetworkModel, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
 
 /// Process RAM begins here: mailboxes and process data.
@@ -108,7 +108,9 @@ impl Learner {
         let mut events = None;
         for answer in answers(exchange, request, reply) {
             let Some(answer) = answer else {
-                model.traffic.datagrams += u64::from(exchange.is_last);
+                if exchange.is_last {
+                    model.traffic.datagrams.record_judged();
+                }
                 continue;
             };
             if let Some(added) = answer.added_events() {
@@ -140,14 +142,13 @@ impl Learner {
             model.traffic.record_processed(answer.at);
         }
         if answer.is_last {
-            model.traffic.datagrams += 1;
+            let datagrams = &mut model.traffic.datagrams;
+            datagrams.record_judged();
             if is_expected && answer.sum == 0 {
-                model.traffic.unanswered += 1;
-                model.traffic.unanswered_alone += u64::from(!model.cyclic.is_empty());
                 let seen = Seen::new((), answer.at, Some(answer.frame));
-                model.traffic.first_unanswered.get_or_insert(seen);
+                datagrams.record_unanswered(seen, !model.cyclic.is_empty());
             } else if answer.sum > 0 {
-                model.traffic.answered += 1;
+                datagrams.record_answered();
             }
         }
     }
@@ -163,40 +164,25 @@ impl Learner {
         if !answer.is_last {
             return;
         }
-        let most = model.traffic.broadcast_answers;
+        let most = model.traffic.broadcasts.most();
         let is_confirmed = is_counted_twice || passed.is_none();
         if counts && self.broadcast_doubt.is_believed(answer.sum, most, is_confirmed) {
-            if answer.is_single && answer.sum > most && !model.cyclic.is_empty() {
-                let more = Seen::new(answer.sum, answer.at, Some(answer.frame));
-                let fewer = model.traffic.broadcast_now.filter(|now| now.value == most && most > 0);
-                let rise = fewer.map(|fewer| CountRise { fewer, more });
-                model.traffic.broadcast_rose = rise.or(model.traffic.broadcast_rose);
-            }
-            model.traffic.broadcast_answers = most.max(answer.sum);
-            model.traffic.broadcast_read = model.traffic.broadcast_read.max(Some(answer.at));
+            let broadcasts = &mut model.traffic.broadcasts;
             let split = (answer.sum - answer.own, answer.own);
             let is_split = split.0 > 0 && split.1 > 0;
             if is_split {
                 let seen = Seen::new(split, answer.at, Some(answer.frame));
-                model.traffic.broadcast_split = Some(seen);
+                broadcasts.record_split(seen);
             }
             if !answer.is_single && !is_split && answer.sum > 0 {
-                model.traffic.was_processed_by_one = true;
                 // A guess which card is which proves nothing here.
                 let sent_by = answer.sent_by.filter(|_| answer.knows_cards);
                 let card = if answer.own > 0 { sent_by } else { sent_by.map(Path::other) };
-                model.traffic.processed_alone =
-                    card.map(|card| Seen::new(card, answer.at, Some(answer.frame)));
+                let seen = card.map(|card| Seen::new(card, answer.at, Some(answer.frame)));
+                broadcasts.record_processed_by_one(seen);
             }
-            let is_news = model.traffic.broadcast_now.is_none_or(|known| known.value != answer.sum);
-            if is_news {
-                let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
-                if model.traffic.broadcast_first_low.is_none()
-                    && answer.sum < model.traffic.broadcast_answers
-                {
-                    model.traffic.broadcast_first_low = Some(seen);
-                }
-                model.traffic.broadcast_now = Some(seen);
+            let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
+            if broadcasts.record(seen, answer.is_single && !model.cyclic.is_empty()) {
                 model.touch();
             }
             if passed.is_none() {
@@ -222,81 +208,93 @@ impl Learner {
             self.addresses.passed(model, answer.sent_by, passed, false);
         }
         let is_position = answer.effect.addressing == Addressing::Position;
-        let device = if is_position {
-            let adp = match (answer.request, self.addresses.present()) {
-                (Some(request), _) => Some(request.adp()),
-                (None, Some(present)) => Some(answer.reply.adp().wrapping_sub(present)),
-                (None, None) => None,
-            };
-            let position = adp.map(Position::from_auto_increment);
-            position.and_then(|position| self.addresses.at_position(model, position, answer))
-        } else {
-            let station = StationAddress(answer.reply.adp());
-            self.addresses.at_station(model, station, answer.sum > 0)
-        };
-        let Some(id) = device else {
+        let station = StationAddress(answer.reply.adp());
+        let Some(id) = self.addressed(model, answer, is_position) else {
             if !is_position && answer.is_last && answer.sum == 0 && answer.is_everywhere() {
-                let seen = Seen::new((), answer.at, Some(answer.frame));
-                let station = StationAddress(answer.reply.adp());
-                self.addresses.asked_in_vain(model, station, seen);
-                model.touch();
+                self.asked_in_vain(model, answer);
             }
             return;
         };
         if answer.sum > 0 && !is_position {
-            self.addresses.answers_at_last(model, StationAddress(answer.reply.adp()));
+            self.addresses.answers_at_last(model, station);
         }
         let Some(device) = model.devices.get_mut(id.index()) else { return };
         if answer.effect.multiple_write {
             clock::handed_round(model, id, answer);
-            return;
-        }
-        if !is_position && answer.sum > answer.command.increment(true, true) {
+        } else if !is_position && answer.sum > answer.command.increment(true, true) {
             // Two controllers have answered: what they say is mixed, and nothing can be learnt of it.
             device.answers(answer.at, Some(answer.frame));
             if answer.is_last {
                 let shared = SharedBy::WorkingCounter(answer.sum);
-                let station = StationAddress(answer.reply.adp());
                 device.shares_address(station, Seen::new(shared, answer.at, Some(answer.frame)));
                 model.touch();
             }
+        } else if answer.sum == 0 {
+            self.unanswered_by(model, id, answer);
+        } else if answer.own > 0 {
+            // Otherwise the other copy was answered, and taught what there was to learn.
+            self.answered_by(model, id, answer);
+        }
+    }
+
+    /// The controller that a datagram is for.
+    fn addressed(
+        &mut self,
+        model: &mut NetworkModel,
+        answer: &Answer<'_>,
+        is_position: bool,
+    ) -> Option<DeviceId> {
+        if !is_position {
+            let station = StationAddress(answer.reply.adp());
+            return self.addresses.at_station(model, station, answer.sum > 0);
+        }
+        let adp = match (answer.request, self.addresses.present()) {
+            (Some(request), _) => request.adp(),
+            (None, Some(present)) => answer.reply.adp().wrapping_sub(present),
+            (None, None) => return None,
+        };
+        self.addresses.at_position(model, Position::from_auto_increment(adp), answer)
+    }
+
+    /// Nobody answers to the station address of a datagram.
+    fn asked_in_vain(&mut self, model: &mut NetworkModel, answer: &Answer<'_>) {
+        let seen = Seen::new((), answer.at, Some(answer.frame));
+        self.addresses.asked_in_vain(model, StationAddress(answer.reply.adp()), seen);
+        model.touch();
+    }
+
+    /// A datagram to a controller came back as it went out.
+    fn unanswered_by(&mut self, model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) {
+        let Some(device) = model.devices.get_mut(id.index()) else { return };
+        if answer.is_last && answer.ado >= FIRST_RAM && answer.effect.writes {
+            coe::written(model, id, answer, false);
             return;
         }
-        if answer.sum == 0 {
-            if answer.is_last && answer.ado >= FIRST_RAM && answer.effect.writes {
-                coe::written(model, id, answer, false);
-                return;
-            }
-            if answer.ado >= FIRST_RAM && answer.effect.reads {
-                device.mailbox.polled = Some(answer.at);
-                return;
-            }
-            if answer.is_last && registers::untaken(device, answer) {
-                // Whether it is there, others tell: who does not fetch requests takes no new one.
-                return;
-            }
-            let is_asked = answer.is_last && answer.is_everywhere();
-            if is_asked && device.answered.is_none() && !is_position {
-                let seen = Seen::new((), answer.at, Some(answer.frame));
-                let station = StationAddress(answer.reply.adp());
-                self.addresses.asked_in_vain(model, station, seen);
+        if answer.ado >= FIRST_RAM && answer.effect.reads {
+            device.mailbox.polled = Some(answer.at);
+            return;
+        }
+        if answer.is_last && registers::untaken(device, answer) {
+            // Whether it is there, others tell: who does not fetch requests takes no new one.
+            return;
+        }
+        if !answer.is_last || !answer.is_everywhere() {
+            return;
+        }
+        if device.answered.is_some() {
+            let is_news = device.silent.is_none();
+            device.is_silent(answer.at, Some(answer.frame));
+            if is_news {
                 model.touch();
-                return;
             }
-            if is_asked && device.answered.is_some() {
-                let is_news = device.silent.is_none();
-                device.is_silent(answer.at, Some(answer.frame));
-                if is_news {
-                    model.touch();
-                }
-            }
-            return;
+        } else if answer.effect.addressing != Addressing::Position {
+            self.asked_in_vain(model, answer);
         }
-        if answer.own == 0 {
-            // The other copy was answered, and taught what there was to learn.
-            return;
-        }
-        if is_position && !self.addresses.is_settled() {
+    }
+
+    /// A controller has processed a datagram.
+    fn answered_by(&mut self, model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) {
+        if answer.effect.addressing == Addressing::Position && !self.addresses.is_settled() {
             // Who is where is a guess so far: only that counts which puts it right.
             if answer.effect.reads {
                 self.addresses.read(model, id, answer);
@@ -306,8 +304,9 @@ impl Learner {
             }
             return;
         }
+        let Some(device) = model.devices.get_mut(id.index()) else { return };
         let is_news = device.answered.is_none() || device.silent.is_some();
-        if model.cyclic.iter().any(Cyclic::has_deficit) {
+        if model.cyclic.iter().any(|cyclic| cyclic.wkc.has_deficit()) {
             device.heard_short = Some(answer.at);
         }
         device.answers(answer.at, Some(answer.frame));
@@ -351,22 +350,20 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
         model.touch();
     }
     if let Some(card) = exchange.copy_lost.filter(|_| !model.is_lost_by_order(request.time)) {
-        model.traffic.copies_lost[card.index()].add(1, request.time);
+        model.traffic.losses.record_copy(card, request.time);
         model.touch();
     }
     if exchange.is_copy_gone && !model.is_lost_by_order(request.time) {
-        model.traffic.copies_gone.add(1, request.time);
+        model.traffic.losses.record_copy_gone(request.time);
         model.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {
         let Ok(datagram) = datagram else { break };
-        let traffic = &mut model.traffic;
-        traffic.datagrams += 1;
+        let counts = &mut model.traffic.datagrams;
+        counts.record_judged();
         let sent = datagram.wkc().0;
         if exchange.added(index, sent, sent) == 0 && datagram.command() != Some(Command::Nop) {
-            traffic.unanswered += 1;
-            let seen = Seen::new((), request.time, Some(request.number));
-            traffic.first_unanswered.get_or_insert(seen);
+            counts.record_unanswered(Seen::new((), request.time, Some(request.number)), false);
         }
         let addressing = datagram.command().map(Command::addressing);
         if addressing == Some(Addressing::Logical) {
@@ -401,10 +398,8 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
             let ids = concerned(model, addressing, datagram.adp());
             registers::may_be_cleared(model, &ids, (datagram.ado(), datagram.data()), request.time);
         }
-        let traffic = &mut model.traffic;
         if matches!(addressing, Some(Addressing::Station | Addressing::Logical)) {
-            traffic.lost_addressed += 1;
-            traffic.lost_logical += u64::from(addressing == Some(Addressing::Logical));
+            model.traffic.datagrams.record_lost(addressing == Some(Addressing::Logical));
         }
     }
 }

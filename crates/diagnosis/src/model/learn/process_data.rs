@@ -40,9 +40,7 @@ pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &An
         if model.cyclic.len() < MOST_CYCLIC {
             *latest = model.cyclic.len();
             let planned = model.planned_exchange.counter(answer.command, start, len);
-            let mut cyclic = Cyclic::new(answer.command, start, len, seen);
-            cyclic.planned = planned;
-            model.cyclic.push(cyclic);
+            model.cyclic.push(Cyclic::new(answer.command, start, len, seen, planned));
             model.touch();
         }
         return false;
@@ -52,7 +50,7 @@ pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &An
     let cyclic = &mut model.cyclic[index];
     let cyclic_before = cyclic.returned.last();
     let (traffic, sees_all) = (&model.traffic, model.sees_all_orders);
-    let highest = cyclic.highest.value;
+    let highest = cyclic.wkc.highest().value;
     let ordered = || {
         let lower = |device: &Device| device.al.is_asked_down();
         let owners: Vec<Owner> = owners(devices, start, len).collect();
@@ -63,7 +61,7 @@ pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &An
         if owners.iter().any(is_lower) || (!are_all && devices.iter().any(lower)) {
             return Ordered::Yes;
         }
-        let since = traffic.first.unwrap_or(answer.at);
+        let since = traffic.recording.first().unwrap_or(answer.at);
         let is_early = !are_all && answer.at.since(since) < JUST_BEGUN;
         let was_before = cyclic_before.unwrap_or(answer.at);
         if !sees_all && (is_early || traffic.may_lack(was_before, answer.at)) {
@@ -73,14 +71,14 @@ pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &An
         }
     };
     if !sees_all && seen.value > highest && is_unordered(devices, start, len) {
-        cyclic.note_low_before(seen);
+        cyclic.wkc.note_low_before(seen);
     }
-    let mut news = cyclic.record(seen, ordered);
-    if cyclic.planned.is_some_and(|planned| cyclic.highest.value < planned) {
-        let since = cyclic.wkc.at.max(cyclic.first.at);
+    let mut news = cyclic.wkc.record(seen, ordered);
+    if cyclic.wkc.is_below_plan() {
+        let since = cyclic.wkc.now().at.max(cyclic.wkc.first().at);
         let is_up = |device: &Device| device.al.may_be_in_op();
         if answer.at.since(since) >= BELOW_PLAN && devices.iter().all(is_up) {
-            news |= cyclic.note_below_plan();
+            news |= cyclic.wkc.note_below_plan();
         }
     }
     // In a ring each copy has the inputs of those alone that it came by.
@@ -91,7 +89,7 @@ pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &An
         let (sent, back) = (request.data(), answer.reply.data());
         news |= cyclic.motion.record(sent, back, answer.at, answer.frame);
     }
-    let is_expected = cyclic.highest.value > 0;
+    let is_expected = cyclic.wkc.highest().value > 0;
     let sent_off = answer.sent_at.is_some_and(|at| cyclic.sent.tick(at));
     if news | sent_off | cyclic.returned.tick(answer.at) {
         model.touch();

@@ -184,7 +184,7 @@ pub(super) fn untaken(device: &mut Device, answer: &Answer<'_>) -> bool {
 pub(super) fn broadcast_read(model: &mut NetworkModel, answer: &Answer<'_>) {
     let Some(status) = al_status(answer.reply.data(), answer.ado) else { return };
     let states = AlState::from_or(status.0 as u8);
-    model.traffic.al_highest = model.traffic.al_highest.max(states.highest());
+    model.traffic.broadcasts.record_state(states.highest());
     let everybody = usize::from(answer.sum) == model.devices.len();
     let (Some(state), true, false) = (states.all_in(), everybody, states.any_error()) else {
         return;

@@ -34,7 +34,7 @@ pub(super) fn teach(model: &mut NetworkModel, steps: &[TimedReading<'_>]) {
     }
     model.host.is_watched = crc.is_some();
     let lost = tally(&told, |main| main.lost);
-    model.traffic.lost = lost.unwrap_or_default();
+    model.traffic.losses.report(lost.unwrap_or_default());
     let reported = &mut model.reported;
     reported.lost = lost;
     reported.late = tally(&told, |main| main.late);
@@ -62,8 +62,7 @@ pub(super) fn teach(model: &mut NetworkModel, steps: &[TimedReading<'_>]) {
             reported.answering = Some(Seen::new(answering, at, None));
         }
     }
-    model.traffic.broadcast_answers = reported.answering_most;
-    model.traffic.broadcast_now = reported.answering;
+    model.traffic.broadcasts.report(reported.answering_most, reported.answering);
     silence_the_rest(model, steps);
 }
 

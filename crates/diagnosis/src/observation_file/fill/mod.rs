@@ -66,7 +66,8 @@ impl ObservationFile {
         model.reported.kind = self.kind;
         model.reported.wiring = if planned.is_some() { WiringBasis::Told } else { self.wiring };
         // Whoever wrote the file saw a place for each of them, also for those that are silent.
-        model.traffic.positions_seen = u16::try_from(model.devices.len()).unwrap_or(u16::MAX);
+        let count = u16::try_from(model.devices.len()).unwrap_or(u16::MAX);
+        model.traffic.broadcasts.record_positions(count);
         model.touch();
         model
     }

@@ -41,7 +41,7 @@ pub(super) fn teach(file: &ObservationFile, model: &mut NetworkModel, steps: &[T
                 };
                 let seen = Seen::new(first, step.at, None);
                 let len = told.length.unwrap_or(1);
-                let mut cyclic = Cyclic::new(told.command.command(), start, len, seen);
+                let mut cyclic = Cyclic::new(told.command.command(), start, len, seen, None);
                 cyclic.name = told.address.is_none().then(|| key.clone()).or(told.name.clone());
                 model.cyclic.push(cyclic);
                 number
@@ -52,10 +52,9 @@ pub(super) fn teach(file: &ObservationFile, model: &mut NetworkModel, steps: &[T
                 model.reported.expected.insert(cyclic.label(), expected);
             }
             let Some(received) = told.received else { continue };
-            cyclic.record(Seen::new(received, step.at, None), || Ordered::No);
-            let open = cyclic.deficits.back_mut().filter(|deficit| deficit.ended.is_none());
-            if let (Some(deficit), Some(Count(count))) = (open, told.count) {
-                deficit.count = deficit.count.saturating_add(count.saturating_sub(1));
+            cyclic.wkc.record(Seen::new(received, step.at, None), || Ordered::No);
+            if let Some(Count(count)) = told.count {
+                cyclic.wkc.add_to_deficit(count.saturating_sub(1));
             }
         }
     }

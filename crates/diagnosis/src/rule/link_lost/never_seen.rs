@@ -18,7 +18,7 @@ pub(super) fn causes(model: &NetworkModel, tree: &Tree, drops: &LinkLosses) -> O
         // Nobody at all was ever seen.
         let others =
             vec![(DeviceOff, device, 0.3), (DeviceMissing, device, 0.15), (SupplyOff, device, 0.1)];
-        let is_nobody = model.tree_is_planned && model.traffic.answered == 0;
+        let is_nobody = model.tree_is_planned && model.traffic.datagrams.answered() == 0;
         return is_nobody.then_some((LinkOpen, 0.4, others));
     }
     if !never_was_there(model, tree, drops, node) {

@@ -15,7 +15,7 @@ const ALL_ASKED: Span = Span::ms(500);
 /// of its card vanish there, and nobody on the way to it answers any more though that card has a link. At a cable
 /// that is out frames would turn back, and broadcasts be answered in both halves.
 pub(super) fn near_end(model: &NetworkModel, tree: &Tree, drops: &LinkLosses) -> Option<usize> {
-    let is_split = model.traffic.broadcast_split.is_some_and(|split| split.at >= drops.first);
+    let is_split = model.traffic.broadcasts.split().is_some_and(|split| split.at >= drops.first);
     if !drops.is_down || !tree.is_on_ring(drops.link) || is_split {
         return None;
     }

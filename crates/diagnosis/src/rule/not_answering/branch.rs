@@ -69,7 +69,7 @@ impl Branch {
 /// Whether broadcasts went on counting all: who still counts is there, and has lost its address.
 fn counts_all(model: &NetworkModel, away: &[Option<Absence>]) -> bool {
     let traffic = &model.traffic;
-    let (Some(now), Some(read)) = (traffic.broadcast_now, traffic.broadcast_read) else {
+    let (Some(now), Some(read)) = (traffic.broadcasts.now(), traffic.broadcasts.latest()) else {
         return false;
     };
     let since = || away.iter().flatten().map(|absence| absence.since.at);

@@ -76,7 +76,7 @@ pub(super) fn restarted(model: &NetworkModel) -> Option<Condition> {
 
 /// The time since which `count` SubDevices that came back at `back` were missing when SubDevices were counted.
 fn missing_since(model: &NetworkModel, count: usize, back: Instant) -> Option<Instant> {
-    let rise = model.traffic.broadcast_rose?;
+    let rise = model.traffic.broadcasts.rose()?;
     let is_same = usize::from(rise.more.value - rise.fewer.value) == count
         && rise.more.at.before(TOGETHER) <= back
         && back <= rise.more.at + TOGETHER;

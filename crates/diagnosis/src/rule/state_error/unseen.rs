@@ -18,7 +18,7 @@ pub(super) fn errors(model: &NetworkModel) -> Vec<(&Device, &AlError)> {
             error.may_be_watchdog() || code.value.explain().class == Class::Timing
         })
     };
-    let is_running = |at: Instant| model.cyclic.iter().any(|cyclic| cyclic.first.at < at);
+    let is_running = |at: Instant| model.cyclic.iter().any(|cyclic| cyclic.wkc.first().at < at);
     let is_unseen = |error: &AlError| error.was_left_over() && is_running(error.status.at);
     let mut unseen = Vec::new();
     for device in &model.devices {

@@ -17,14 +17,13 @@ pub(in crate::rule) fn entered_otherwise(model: &NetworkModel, device: &Device) 
     let traffic = &model.traffic;
     let is_ring = tree
         .is_some_and(|tree| tree.closes_at().is_some() || tree.first(Path::B).is_some())
-        || traffic.was_processed_by_one
-        || traffic.broadcast_split.is_some();
+        || traffic.broadcasts.came_in_copies();
     let status = device.dl.last?;
     // It was asked by the frame that showed its links; a list tells both at the same time.
     let is_there = device.answered.is_some() && device.silent.is_none();
     let wanted = wanted(model, device);
     // Where positions may have moved, a plan with another entry is for the comparison with it.
-    if is_ring || !is_there || (wanted != Port::A && traffic.frames > 0) {
+    if is_ring || !is_there || (wanted != Port::A && traffic.recording.frames() > 0) {
         return None;
     }
     let has_link = |port: Port| status.value.port_state(port).link;

@@ -27,15 +27,17 @@ pub(super) fn suspects(model: &NetworkModel, deficit: &Deficit) -> Option<Suspec
         return None;
     }
     let traffic = &model.traffic;
-    let counts_all = traffic
-        .broadcast_now
-        .is_some_and(|now| now.value >= traffic.broadcast_answers)
-        && traffic.broadcast_read.is_some_and(|read| since + ANSWERS_LATE < read && read <= until);
+    let counts_all =
+        traffic.broadcasts.now().is_some_and(|now| now.value >= traffic.broadcasts.most())
+            && traffic
+                .broadcasts
+                .latest()
+                .is_some_and(|read| since + ANSWERS_LATE < read && read <= until);
     if counts_all {
         return None;
     }
-    let gone = traffic.broadcast_now.filter(|now| now.at <= until && now.at + AT_ONCE >= since);
-    let gone = gone.map(|now| usize::from(traffic.broadcast_answers.saturating_sub(now.value)));
+    let gone = traffic.broadcasts.now().filter(|now| now.at <= until && now.at + AT_ONCE >= since);
+    let gone = gone.map(|now| usize::from(traffic.broadcasts.most().saturating_sub(now.value)));
     let fits = |node: &usize| {
         let behind = tree.subtree(*node);
         is_between(tree, *node)
@@ -99,12 +101,12 @@ fn owners(model: &NetworkModel, behind: &[usize]) -> usize {
 fn lacks(model: &NetworkModel, cyclic: &Cyclic, behind: &[usize], since: Instant) -> bool {
     let own = model.owners(cyclic).filter(|owner| behind.contains(&owner.device.index()));
     let share: u16 = own.filter_map(|owner| shares(cyclic, &owner).first().copied()).sum();
-    let then = cyclic.deficits.iter().rev().find(|deficit| {
+    let then = cyclic.wkc.deficits().iter().rev().find(|deficit| {
         let at = deficit.first.at;
         at <= since + AT_ONCE && since <= at + AT_ONCE
     });
     let lacking = |deficit: &Deficit| {
-        let now = if deficit.ended.is_some() { deficit.lowest } else { cyclic.wkc.value };
+        let now = if deficit.ended.is_some() { deficit.lowest } else { cyclic.wkc.now().value };
         deficit.expected.saturating_sub(now)
     };
     share == then.map_or(0, lacking)

@@ -27,6 +27,7 @@ use super::memory::at;
 pub use latch_unit::{Edge, LatchInput};
 pub(super) use local::RunningClock;
 pub use quartz::LocalClock;
+pub(super) use receive_time::FrameEntries;
 pub use sync_unit::SyncSignal;
 pub(super) use sync_unit::SyncUnit;
 pub(super) use time_loop::TimeLoop;

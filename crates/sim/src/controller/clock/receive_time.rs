@@ -5,13 +5,41 @@
 //! is the same one as long as nothing else is on the line. An ET1200 that is entered from behind
 //! (0x0936 = 1) takes the frame before instead.
 
-use linesman_proto::port::Port;
+use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register as r;
 use linesman_proto::register::ControllerType;
 use linesman_proto::time::Instant;
 
 use crate::controller::core::{Core, FrameProgress};
 use crate::hardware::PortKind;
+
+/// Frames that came in at the ports, and whose times are kept.
+#[derive(Clone, Debug)]
+pub(in crate::controller) struct FrameEntries {
+    /// The last frame whose first bit came in by each port, and when.
+    pub(in crate::controller) entered: PortMap<(u64, Instant)>,
+    /// The frame whose receive times are being latched.
+    latched: Option<u64>,
+    /// Ports that take the time of the next frame which comes in after an instant.
+    pub(in crate::controller) waits: PortMap<Option<Instant>>,
+}
+
+impl Default for FrameEntries {
+    fn default() -> Self {
+        Self {
+            entered: PortMap([(u64::MAX, Instant::ZERO); 4]),
+            latched: None,
+            waits: PortMap::default(),
+        }
+    }
+}
+
+impl FrameEntries {
+    /// No frame's times are waited for any more.
+    pub(in crate::controller) fn forget_latches(&mut self) {
+        (self.latched, self.waits) = (None, PortMap::default());
+    }
+}
 
 impl Core {
     /// The frame that just passed wrote to 0x0900: its receive times are kept, those of ports that
@@ -24,9 +52,9 @@ impl Core {
             self.latch_next_frames(number, began);
             return;
         }
-        self.latched = Some(number);
+        self.entries.latched = Some(number);
         for port in Port::ALL {
-            let (frame, when) = self.entered[port];
+            let (frame, when) = self.entries.entered[port];
             if frame == number && self.hardware.ports[port] != PortKind::Absent {
                 self.latch_receive_time(port, when);
             }
@@ -35,14 +63,14 @@ impl Core {
 
     /// A frame comes in at a port: its time is kept if this is the one that is waited for.
     pub(in crate::controller) fn latch_entry(&mut self, port: Port, number: u64, when: Instant) {
-        if !self.loops.is_open(port) {
+        if !self.ports.loops.is_open(port) {
             return;
         }
-        let waited = self.latch_waits[port].is_some_and(|from| from < when);
+        let waited = self.entries.waits[port].is_some_and(|from| from < when);
         if waited {
-            self.latch_waits[port] = None;
+            self.entries.waits[port] = None;
         }
-        if waited || self.latched == Some(number) {
+        if waited || self.entries.latched == Some(number) {
             self.latch_receive_time(port, when);
         }
     }
@@ -60,12 +88,12 @@ impl Core {
             if self.hardware.ports[port] == PortKind::Absent {
                 continue;
             }
-            let (frame, when) = self.entered[port];
+            let (frame, when) = self.entries.entered[port];
             if port == Port::A {
                 if frame == number {
                     self.latch_receive_time(port, when);
                 } else {
-                    self.latch_waits[port] = Some(began);
+                    self.entries.waits[port] = Some(began);
                 }
             } else if reversed {
                 if frame != u64::MAX {
@@ -75,7 +103,7 @@ impl Core {
                 // One that was ahead of it comes back only now.
                 self.latch_receive_time(port, when);
             } else {
-                self.latch_waits[port] = Some(began);
+                self.entries.waits[port] = Some(began);
             }
         }
     }

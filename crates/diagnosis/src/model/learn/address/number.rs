@@ -169,7 +169,7 @@ impl Addresses {
 
     /// How many controllers a frame has passed at most.
     fn most_counted(&self, model: &NetworkModel) -> usize {
-        let counted = model.traffic.positions_seen.max(model.traffic.broadcast_answers);
+        let counted = model.traffic.broadcasts.counted();
         usize::from(counted.max(self.present.unwrap_or(0))).min(MOST_DEVICES)
     }
 

@@ -1,17 +1,31 @@
-//! Wiring that was found, and whether a comparison with the plan says anything.
+//! Wiring that was found, laid upon the plan, and whether that says anything.
 
 use linesman_config::compare::{Comparison, Difference, Side, There, Wanted, compare, unlike};
 use linesman_proto::address::{DeviceId, Path, Position};
 use linesman_proto::port::Port;
 use linesman_proto::time::Instant;
 use linesman_proto::topology::derive::EntryBasis;
-use linesman_proto::topology::{Reconstruction, SeenController};
+use linesman_proto::topology::{Reconstruction, SeenController, Tree};
 
-use super::FoundWiring;
 use crate::model::{Device, NetworkModel};
 
+/// What was found, as far as it is enough to be laid upon the plan.
+pub(crate) struct FoundWiring<'a> {
+    pub(crate) model: &'a NetworkModel,
+    pub(crate) planned: &'a Tree,
+    pub(crate) wanted: Vec<Wanted>,
+    pub(crate) tree: Tree,
+    pub(crate) basis: Vec<EntryBasis>,
+    /// Whose answers those of a found node are taken for: positions move with what is missing.
+    pub(crate) ids: Vec<DeviceId>,
+    pub(crate) there: Vec<There>,
+    /// When the last of it was learnt.
+    pub(crate) at: Instant,
+    pub(crate) frame: Option<u64>,
+}
+
 impl<'a> FoundWiring<'a> {
-    pub(super) fn of(model: &'a NetworkModel) -> Option<Self> {
+    pub(crate) fn of(model: &'a NetworkModel) -> Option<Self> {
         let planned = model.tree.as_ref().filter(|_| model.tree_is_planned)?;
         let is_ring = planned.closes_at().is_some();
         if !model.devices.iter().any(is_known_to_plan) || (is_ring && !is_closed(model)) {
@@ -22,13 +36,14 @@ impl<'a> FoundWiring<'a> {
         ids.extend(
             model.devices.iter().map(|device| device.id).filter(|id| id.index() >= planned.len()),
         );
-        let count = usize::from(model.traffic.positions_seen);
+        let count = usize::from(model.traffic.broadcasts.positions());
         if count == 0 || count > ids.len() {
             return None;
         }
         ids.truncate(count);
         // Where positions have moved, their station addresses tell whose answers they are taken for.
-        let placed = (0..model.traffic.positions_seen).map(|at| model.by_position(Position(at)));
+        let placed =
+            (0..model.traffic.broadcasts.positions()).map(|at| model.by_position(Position(at)));
         if let Some(placed) = placed.collect::<Option<Vec<DeviceId>>>() {
             ids = placed;
         }
@@ -66,7 +81,7 @@ impl<'a> FoundWiring<'a> {
         })
     }
 
-    pub(super) fn compare(&self) -> Comparison {
+    pub(crate) fn compare(&self) -> Comparison {
         if self.is_as_planned() {
             return Comparison::default();
         }
@@ -90,7 +105,7 @@ impl<'a> FoundWiring<'a> {
     }
 
     /// Whether a comparison says anything that can be relied on.
-    pub(super) fn tells(&self, comparison: &Comparison) -> bool {
+    pub(crate) fn tells(&self, comparison: &Comparison) -> bool {
         let ring = self.planned.ring_nodes();
         let is_gone = |difference: &Difference| {
             // A ring that is closed goes on behind who is missing: it is not without power, or cut off.
@@ -117,8 +132,8 @@ impl<'a> FoundWiring<'a> {
 /// Whether the ring was seen closed, with everybody in it plugged in the right way round: frames of card A are
 /// processed by all of them, and those of card B by nobody.
 fn is_closed(model: &NetworkModel) -> bool {
-    let by = model.traffic.processed_alone.map(|seen| seen.value);
-    model.traffic.was_processed_by_one && by != Some(Path::B)
+    let by = model.traffic.broadcasts.processed_alone().map(|seen| seen.value);
+    model.traffic.broadcasts.was_processed_by_one() && by != Some(Path::B)
 }
 
 /// The closed ring that these controllers form. All on its way are entered at port A, since they process the
@@ -142,7 +157,7 @@ fn is_known_to_plan(device: &Device) -> bool {
     device.planned.is_some_and(|planned| planned.identity.is_some())
 }
 
-pub(super) fn wanted(device: Option<&Device>) -> Wanted {
+pub(crate) fn wanted(device: Option<&Device>) -> Wanted {
     let planned = device.and_then(|device| device.planned);
     planned.map_or_else(Wanted::default, |planned| Wanted {
         identity: planned.identity,

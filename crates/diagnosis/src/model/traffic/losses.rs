@@ -1,0 +1,175 @@
+//! Frames that did not come back, or came back damaged or in one copy alone.
+
+use std::collections::VecDeque;
+
+use linesman_proto::address::Path;
+use linesman_proto::time::Instant;
+
+use super::silence::{self, Silence};
+use crate::model::{Seen, Tally};
+
+/// Times of lost frames kept.
+pub const LOST_KEPT: usize = 64;
+
+/// Lost frames. The learner fills it in as requests are given up, the intake damaged ones.
+#[derive(Clone, Default, Debug)]
+pub struct LostFrames {
+    frames: Tally,
+    first: Option<Seen<()>>,
+    latest: Option<Seen<()>>,
+    times: VecDeque<Instant>,
+    copies: [Tally; 2],
+    copies_gone: Tally,
+    damaged: Tally,
+    silences: VecDeque<Silence>,
+    swallowed: VecDeque<Silence>,
+}
+
+impl LostFrames {
+    // ---- what intake, learner and observation files tell ----
+
+    /// So many frames were lost, as somebody else counted them.
+    pub fn report(&mut self, frames: Tally) {
+        self.frames = frames;
+    }
+
+    /// A request was lost that went out when `returns_before` frames had come back, the next of them at `ended`. One
+    /// that ports which were opened or closed on purpose have swallowed (`by_order`) makes a silence, but is no loss.
+    pub(super) fn record(
+        &mut self,
+        seen: Seen<()>,
+        returns_before: u64,
+        by_order: bool,
+        ended: Option<Instant>,
+    ) {
+        let row = self.silences.back_mut().filter(|row| row.returns_before == returns_before);
+        if !by_order {
+            self.frames.add(1, seen.at);
+            if row.is_none() {
+                if self.times.len() == LOST_KEPT {
+                    self.times.pop_front();
+                }
+                self.times.push_back(seen.at);
+            }
+            self.first.get_or_insert(seen);
+            self.latest = Some(seen);
+        }
+        if let Some(silence) = row {
+            silence.goes_on(seen);
+            silence.ended = ended;
+            return;
+        }
+        silence::keep(&mut self.silences, Silence::begin(seen, ended, returns_before));
+    }
+
+    /// In a ring, of a request the copy alone came back that nobody had processed; of those that had been processed one
+    /// came back at `ended` since.
+    pub(super) fn record_swallowed(
+        &mut self,
+        seen: Seen<()>,
+        returns_before: u64,
+        ended: Option<Instant>,
+    ) {
+        if let Some(silence) = self.swallowed.back_mut()
+            && silence.ended.is_none_or(|ended| ended >= seen.at)
+        {
+            silence.goes_on(seen);
+            return;
+        }
+        silence::keep(&mut self.swallowed, Silence::begin(seen, ended, returns_before));
+    }
+
+    /// A frame came back: no silence goes on.
+    pub(super) fn end_silence(&mut self, at: Instant) {
+        if let Some(silence) = self.silences.back_mut() {
+            silence.ended.get_or_insert(at);
+        }
+    }
+
+    /// A frame came back that somebody had processed.
+    pub(super) fn end_swallowing(&mut self, at: Instant) {
+        if let Some(silence) = self.swallowed.back_mut() {
+            silence.ended.get_or_insert(at);
+        }
+    }
+
+    /// Of a request that was sent at `at` the copy of one card came back, and not the one to this card.
+    pub fn record_copy(&mut self, card: Path, at: Instant) {
+        self.copies[card.index()].add(1, at);
+    }
+
+    /// In a ring that was whole before, one copy alone came back of a request that was sent at `at`.
+    pub(crate) fn record_copy_gone(&mut self, at: Instant) {
+        self.copies_gone.add(1, at);
+    }
+
+    /// A frame came back with a wrong check sequence.
+    pub(crate) fn record_damaged(&mut self, at: Instant) {
+        self.damaged.add(1, at);
+    }
+
+    /// A new spell of errors begins.
+    pub(crate) fn begin_spell(&mut self) {
+        self.frames.begin_spell();
+        self.copies.iter_mut().for_each(Tally::begin_spell);
+    }
+
+    // ---- what rules ask ----
+
+    /// Frames whose way out was seen and whose return was not, though others came back later.
+    #[must_use]
+    pub const fn frames(&self) -> Tally {
+        self.frames
+    }
+
+    /// The first lost frame.
+    #[must_use]
+    pub const fn first(&self) -> Option<Seen<()>> {
+        self.first
+    }
+
+    /// The latest lost frame.
+    #[must_use]
+    pub const fn latest(&self) -> Option<Seen<()>> {
+        self.latest
+    }
+
+    /// When the first of each row of them was sent between two returns, in the order in which that was known, at most
+    /// [`LOST_KEPT`].
+    #[must_use]
+    pub const fn times(&self) -> &VecDeque<Instant> {
+        &self.times
+    }
+
+    /// Of the frames of which the copy of one card came back: how many did not come to `card`.
+    #[must_use]
+    pub const fn copies(&self, card: Path) -> Tally {
+        self.copies[card.index()]
+    }
+
+    /// In a ring that was whole before, frames of which one copy alone came back, with none after them of which both
+    /// did: some of them at least.
+    #[must_use]
+    pub const fn copies_gone(&self) -> Tally {
+        self.copies_gone
+    }
+
+    /// Frames that came back with a wrong check sequence.
+    #[must_use]
+    pub const fn damaged(&self) -> Tally {
+        self.damaged
+    }
+
+    /// When nothing at all came back, oldest first, at most [`SILENCES_KEPT`](silence::SILENCES_KEPT).
+    #[must_use]
+    pub const fn silences(&self) -> &VecDeque<Silence> {
+        &self.silences
+    }
+
+    /// In a ring, when what card B had sent came round untouched, and nothing of what card A had sent came back:
+    /// oldest first, at most [`SILENCES_KEPT`](silence::SILENCES_KEPT).
+    #[must_use]
+    pub const fn swallowed(&self) -> &VecDeque<Silence> {
+        &self.swallowed
+    }
+}
