@@ -1,18 +1,15 @@
 //! Wire of a virtual segment for a MainDevice of one's own.
 
-use linesman_diagnosis::{Diagnosis, Engine, Event, FrameSeen, InputKind, Setup};
-use linesman_diagnosis::{Direction, HostObservation};
+use linesman_diagnosis::{Diagnosis, Direction, Engine, Event, HostObservation, InputKind, Setup};
 use linesman_link::error::LinkError;
-use linesman_proto::address::{Network, Path};
+use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::transport::{FrameSink, RxFrame, Transport};
+use linesman_session::frame::{FRAME_ROOM, FrameSummary};
 use linesman_sim::segment_file::SegmentFile;
 
 use crate::segment::build;
 use crate::{Error, Simulation};
-
-/// Room for the longest frame, in bytes.
-const FRAME_ROOM: usize = 1_536;
 
 /// A virtual segment that another MainDevice drives with its own frames, and the diagnosis that watches them.
 ///
@@ -32,7 +29,8 @@ impl VirtualWire {
     pub fn new(file: &SegmentFile) -> Result<Self, Error> {
         let segment = build(file, &Error::Segment)?;
         let source = format!("sim:{}", file.name);
-        let setup = Setup { input: InputKind::Driven, source, ..Setup::default() };
+        let setup =
+            Setup { input: InputKind::Driven, host_counters: true, source, ..Setup::default() };
         Ok(Self { segment, engine: Engine::new(setup), frames: 0 })
     }
 
@@ -114,16 +112,9 @@ impl VirtualWire {
 
     fn see(&mut self, time: Instant, direction: Direction, bytes: &[u8]) {
         self.frames += 1;
-        self.engine.handle_frame(&FrameSeen {
-            network: Network::default(),
-            path: Some(Path::A),
-            direction,
-            time,
-            number: self.frames,
-            fcs: None,
-            truncated: false,
-            bytes,
-        });
+        let (number, path) = (self.frames, Some(Path::A));
+        let passed = FrameSummary { time, number, path, direction, truncated: false };
+        self.engine.handle_frame(&passed.seen(bytes));
     }
 }
 

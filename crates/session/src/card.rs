@@ -3,12 +3,12 @@
 use linesman_diagnosis::HostEvent;
 use linesman_proto::time::Span;
 
-/// What a card has counted since it was looked at last.
+/// Counts of a card since it was looked at last.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct CardSample {
-    /// Whether there is a link now.
+    /// Presence of a link now.
     pub carrier: bool,
-    /// How often that has changed.
+    /// Number of changes of that.
     pub carrier_changes: u64,
     /// Received frames with a wrong check sequence.
     pub crc: u64,
@@ -26,14 +26,14 @@ pub struct CardSample {
     pub clock_step_ns: Option<i64>,
 }
 
-/// What is news of a card.
+/// Watch over one card: the news in its counts.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct CardWatch {
     carrier: Option<bool>,
 }
 
 impl CardWatch {
-    /// What of a sample is news; that there is a link or none is news when it is seen first.
+    /// News in a sample; that there is a link or none is news when it is seen first.
     pub fn events(&mut self, sample: &CardSample) -> impl Iterator<Item = HostEvent> + use<> {
         let before = self.carrier.replace(sample.carrier);
         let went_and_came = sample.carrier_changes > 1 && before == Some(sample.carrier);

@@ -8,7 +8,7 @@ use linesman_proto::time::Instant;
 
 use crate::frame::FrameSummary;
 
-/// What a session shows to a diagnosis, and hears from it.
+/// Interface of a session to a diagnosis: frames and observations in, questions and findings out.
 pub trait DiagnosisInput {
     /// A frame left a card or came back.
     fn frame(&mut self, frame: &FrameSeen<'_>);
@@ -24,9 +24,9 @@ pub trait DiagnosisInput {
     fn turn(&mut self, now: Instant);
     /// When [`turn`](Self::turn) has something to do.
     fn poll_timeout(&self) -> Option<Instant>;
-    /// What it would like to have read.
+    /// Next question: something that it would like to have read.
     fn poll_probe(&mut self) -> Option<Probe>;
-    /// What happened to findings.
+    /// Next change of a finding.
     fn poll_event(&mut self) -> Option<Event>;
 }
 

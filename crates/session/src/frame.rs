@@ -8,7 +8,7 @@ use linesman_proto::time::Instant;
 /// end cut off.
 pub const FRAME_ROOM: usize = 1_536;
 
-/// What is known of a frame that passed, without its bytes.
+/// Time, number, card and direction of a frame that passed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FrameSummary {
     /// When, as [`FrameSeen::time`].

@@ -9,7 +9,7 @@ use linesman_sim::segment::{HostPort, Segment};
 use crate::card::{CardSample, CardWatch};
 use crate::transport::{FrameSink, RxFrame};
 
-/// How often the virtual cards' counters are looked at, if nothing is told of their links.
+/// Interval at which the virtual cards' counters are looked at, if nothing is told of their links.
 const LOOK_EVERY: Span = Span::ms(100);
 /// The longest frame, without check sequence.
 const FRAME: usize = 1_514;
@@ -61,8 +61,7 @@ impl SegmentLine {
         Path::ALL.into_iter().take(self.paths)
     }
 
-    /// How a MainDevice has to be set up for this line, without deadlines: `options` with what the length of the line
-    /// and its cards ask for.
+    /// Options of a MainDevice for this line: `options` with what the length of the line and its cards ask for.
     #[must_use]
     pub fn options(&self, options: Options) -> Options {
         let options = Options { ring: self.paths > 1, ..options };

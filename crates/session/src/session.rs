@@ -29,7 +29,7 @@ pub trait SessionHooks {
     fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice);
     /// Everything up to `now` is done: time for commands. Says whether to go on.
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool;
-    /// Whether the turn is that of somebody outside, for whom the session waits: nothing is sent until
+    /// True while the turn is that of somebody outside, for whom the session waits: nothing is sent until
     /// [`turn`](Self::turn) is called again.
     fn is_paused(&self) -> bool {
         false
@@ -46,7 +46,7 @@ pub trait SessionHooks {
 pub struct Session<H> {
     main: MainDevice,
     hooks: H,
-    /// Where frames lie that the hooks do not keep.
+    /// Room for frames that the hooks do not keep.
     buffer: Vec<u8>,
     /// Frames that passed so far, both ways.
     frames: u64,
@@ -136,7 +136,7 @@ impl<H: SessionHooks> Session<H> {
         intake.frame_received(RxFrame { at, path, len, truncated: len < frame.len() });
     }
 
-    /// Where frames are received that came back up to `now`, without being copied.
+    /// Intake for frames that came back up to `now`, which are received in place.
     pub const fn intake(&mut self, now: Instant) -> Intake<'_, H> {
         Intake { session: self, now }
     }

@@ -12,15 +12,15 @@ pub struct RxFrame {
     pub at: Instant,
     /// At which card.
     pub path: Path,
-    /// How many bytes it has in the room that it was received in, without check sequence.
+    /// Its length in the room that it was received in, in bytes without check sequence.
     pub len: usize,
     /// Its end is missing because it was longer than any frame may be.
     pub truncated: bool,
 }
 
-/// Who takes in what has come back: it says where, so that nothing is copied on the way.
+/// Sink for frames that have come back: it gives the room, so that nothing is copied on the way.
 pub trait FrameSink {
-    /// Where the next frame is to be received: room for the longest.
+    /// Room for the next frame, however long it is.
     fn room(&mut self) -> &mut [u8];
     /// It was.
     fn frame_received(&mut self, frame_received: RxFrame);
@@ -31,7 +31,7 @@ pub trait Transport {
     /// Why the line cannot be used any more.
     type Error;
 
-    /// How a MainDevice has to be set up for this line; all else is as usual.
+    /// Options of a MainDevice for this line; all else is as usual.
     fn options(&self) -> Options;
 
     /// Now.

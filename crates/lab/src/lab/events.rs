@@ -13,7 +13,7 @@ use linesman_session::{DiagnosisInput, RunEvent};
 use super::Lab;
 use crate::options::Begin;
 
-/// How many events are kept; the oldest go first.
+/// Number of events that are kept; the oldest go first.
 const KEPT_EVENTS: usize = 10_000;
 
 impl Lab {

@@ -2,10 +2,11 @@
 
 use std::convert::Infallible;
 
-use linesman_diagnosis::{Direction, Engine, FrameSeen, HostObservation};
+use linesman_diagnosis::{Direction, Engine, HostObservation};
 use linesman_maindevice::Options;
-use linesman_proto::address::{Network, Path};
+use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
+use linesman_session::frame::FrameSummary;
 use linesman_session::segment_line::SegmentLine;
 use linesman_session::transport::{FrameSink, RxFrame, Transport};
 use linesman_sim::segment::{Outgoing, Segment};
@@ -16,13 +17,13 @@ use super::capture_loss::CaptureLoss;
 /// The segment, and who listens on the computer of the MainDevice.
 pub(super) struct LabLine {
     pub(super) line: SegmentLine,
-    /// Whether the counters of the cards are shown to the diagnosis.
+    /// True if the counters of the cards are shown to the diagnosis.
     counters: bool,
     pub(super) capture: CaptureTool,
     outgoing: Vec<u8>,
 }
 
-/// What a capture tool sees: what was handed to a card, when it was, and what came back.
+/// Capture tool: sees what was handed to a card, when it was, and what came back.
 #[derive(Default)]
 pub(super) struct CaptureTool {
     pub(super) recorder: Option<Tap>,
@@ -42,16 +43,8 @@ impl CaptureTool {
             return;
         }
         self.count += 1;
-        let seen = FrameSeen {
-            network: Network::default(),
-            path: Some(path),
-            direction,
-            time,
-            number: self.count,
-            fcs: None,
-            truncated: false,
-            bytes,
-        };
+        let (number, path) = (self.count, Some(path));
+        let seen = FrameSummary { time, number, path, direction, truncated: false }.seen(bytes);
         if let Some(listener) = &mut self.listener {
             listener.handle_frame(&seen);
         }
@@ -142,7 +135,7 @@ impl Transport for LabLine {
     fn note_late(&mut self, _: Span) {}
 }
 
-/// What comes back, shown to a capture tool on its way to the MainDevice.
+/// Frames that come back, shown to a capture tool on their way to the MainDevice.
 struct CapturedIntake<'a> {
     capture: &'a mut CaptureTool,
     intake: &'a mut dyn FrameSink,

@@ -37,6 +37,19 @@ impl OtherSession {
         shown.turn(now);
     }
 
+    /// As [`Session::handle_frame`](linesman_session::Session::handle_frame), of a frame that has just come.
+    pub(super) fn handle_frame(
+        &mut self,
+        now: Instant,
+        path: Path,
+        frame: &[u8],
+        shown: &mut LabDiagnosis,
+    ) {
+        self.frames += 1;
+        shown.frame(&summary(self.frames, path, Direction::Received, now).seen(frame));
+        self.soem.handle_frame(now, path, frame);
+    }
+
     /// As [`Session::send`](linesman_session::Session::send).
     pub(super) fn send<L: Transport<Error = Infallible>>(
         &mut self,

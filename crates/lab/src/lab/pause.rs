@@ -67,8 +67,11 @@ impl Lab {
     pub(super) fn fetch_waiting(&mut self, now: Instant) {
         while let Some((path, frame)) = self.socket.waiting.pop_front() {
             match &mut self.other {
-                Some(other) => other.soem.handle_frame(now, path, &frame),
-                None => self.session.main_mut().handle_frame(now, path, &frame),
+                Some(other) => {
+                    let shown = self.session.hooks_mut().diagnosis_mut();
+                    other.handle_frame(now, path, &frame, shown);
+                }
+                None => self.session.handle_frame(now, now, path, &frame),
             }
         }
     }

@@ -1,4 +1,4 @@
-//! ServiceOrders for services: taken between two cycles, answered when the MainDevice has done them.
+//! Orders for services: taken between two cycles, answered when the MainDevice has done them.
 
 use std::sync::mpsc::{Receiver, Sender};
 
@@ -10,7 +10,7 @@ use linesman_runtime::run::Io;
 use super::RequestError;
 use crate::handle::{DeviceHandle, PlanId};
 
-/// ServiceOrders that are taken in one cycle at most.
+/// Orders that are taken in one cycle at most.
 const A_CYCLE: usize = 16;
 /// An order for a SubDevice that is not up yet waits so long for it; then the refusal tells.
 const COMES_UP: Span = Span::s(5);
@@ -26,7 +26,7 @@ pub(crate) struct ServiceOrder {
     pub(super) answer: AnswerTo,
 }
 
-/// ServiceOrders of a run: those that are not taken, those that wait for their SubDevice, those that are being done.
+/// Orders of a run: those that are not taken, those that wait for their SubDevice, those that are being done.
 pub(crate) struct ServiceOrders<'a> {
     new: &'a Receiver<ServiceOrder>,
     early: Vec<(Instant, ServiceOrder)>,

@@ -11,15 +11,15 @@ use super::diagnosis_thread::{DiagnosisObserver, EFFECT, PART};
 use super::tap::Tap;
 use crate::part::{PartFailure, guard};
 
-/// Where frames of a run are judged.
+/// Input of the diagnosis of a run, by where frames are judged.
 pub enum RunDiagnosis {
     /// Nowhere.
     Nowhere,
     /// In a thread of its own, so that the cycle never waits for it.
     Queued {
-        /// Where frames are kept for it.
+        /// The queue of frames for it.
         tap: Tap,
-        /// What it would like to have read.
+        /// Questions: what it would like to have read.
         probes: Receiver<Probe>,
     },
     /// At once, in virtual time: the same run gives the same findings.

@@ -21,7 +21,7 @@ pub(super) const EFFECT: &str = "the line is driven on, and not judged any more"
 
 /// A diagnosis of a run: an [`Engine`], but in tests.
 pub trait DiagnosisObserver: DiagnosisInput + Send {
-    /// So many frames passed up to this time that were not shown.
+    /// Notes that `count` frames passed up to this time and were not shown.
     fn missed(&mut self, count: u64, at: Instant);
     /// The run has ended.
     fn finish(&mut self, at: Instant);

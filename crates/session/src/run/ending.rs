@@ -8,24 +8,24 @@ use super::{PlanRun, RunEvent};
 use crate::application::Application;
 use crate::diagnosis::DiagnosisInput;
 
-/// How long SubDevices may take to go down at the end.
+/// Time that SubDevices may take to go down at the end.
 const LEAVE_PATIENCE: Span = Span::s(5);
-/// So many cycles carry zeros before the exchange ends.
+/// Number of cycles that carry zeros before the exchange ends.
 const SAFE_CYCLES: u64 = 3;
 
-/// How far an end has come.
+/// Stage of an end.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Ending {
     /// Outputs are zero for some more cycles.
     Zero {
         /// When they have passed.
         until: Instant,
-        /// Where SubDevices are brought then.
+        /// State that SubDevices are brought to then.
         to: AlState,
     },
     /// SubDevices go down.
     Down {
-        /// How long that may take.
+        /// End of the time that this may take.
         until: Instant,
     },
 }

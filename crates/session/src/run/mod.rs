@@ -18,11 +18,11 @@ use crate::frame::FrameSummary;
 use crate::probe;
 use crate::session::SessionHooks;
 
-/// How long a scan of a line of usual length may take: one of a thousand SubDevices takes some
+/// Time that a scan of a line of usual length may take: one of a thousand SubDevices takes some
 /// seconds.
 pub const SCAN_PATIENCE: Span = Span::s(60);
 
-/// What is to be run.
+/// Plan that is to be run.
 pub enum PlanSource {
     /// A plan that is made already.
     Plan(Box<Plan>),
@@ -36,7 +36,7 @@ pub type MakePlan = Box<dyn FnOnce(&Inventory) -> Result<Plan, String> + Send>;
 /// Something that happened in a run.
 #[derive(Clone, Debug)]
 pub enum RunEvent {
-    /// What the scan found.
+    /// Inventory that the scan found.
     Scanned(Box<Inventory>),
     /// The plan that is started.
     Planned(Arc<Plan>),
@@ -56,7 +56,7 @@ pub enum RunFailure {
     /// The line does not answer.
     #[error("{0}")]
     Scan(String),
-    /// What is there is not what is wanted.
+    /// The line is not the one that is wanted.
     #[error("{0}")]
     Plan(String),
 }
@@ -135,7 +135,7 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
         Io { main, now, missed, withheld: self.withheld, old: false }
     }
 
-    /// Whether outputs are withheld because they were not given in time.
+    /// True while outputs are withheld because they were not given in time.
     #[must_use]
     pub const fn is_withheld(&self) -> bool {
         self.withheld
@@ -174,7 +174,7 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
         &mut self.application
     }
 
-    /// What happened, oldest first; each is given once.
+    /// Next event, oldest first; each is given once.
     pub fn poll_event(&mut self) -> Option<RunEvent> {
         self.events.pop_front()
     }
