@@ -367,6 +367,30 @@ fn without_privilege_the_way_to_get_it_is_told() {
 }
 
 #[test]
+#[allow(unsafe_code, reason = "the library forks by a program that it begins at once")]
+fn a_lock_that_is_dropped_is_free_though_a_child_was_just_forked() {
+    with_cable(|| {
+        let lock = CardLock::take("va").unwrap();
+        // A copy of the socket in a child that lives on for a while, as between fork and exec.
+        // SAFETY: the child calls nothing but functions that are safe after a fork, and ends.
+        let child = unsafe { libc::fork() };
+        assert!(child >= 0);
+        if child == 0 {
+            // SAFETY: as above.
+            unsafe {
+                libc::usleep(60_000);
+                libc::_exit(0);
+            }
+        }
+        drop(lock);
+        assert_eq!(CardLock::holder("va").unwrap(), None);
+        CardLock::take("va").unwrap();
+        // SAFETY: the child is ours, and nobody else waits for it.
+        unsafe { libc::waitpid(child, std::ptr::null_mut(), 0) };
+    });
+}
+
+#[test]
 fn a_card_is_locked_once_until_the_lock_is_dropped() {
     with_cable(|| {
         let lock = CardLock::take("va").unwrap();

@@ -10,10 +10,13 @@ use std::fs;
 use std::mem;
 use std::os::fd::{AsRawFd as _, OwnedFd};
 use std::path::PathBuf;
+use std::thread;
+use std::time::Duration;
 
 use rustix::io::Errno;
 use rustix::net::{
-    AddressFamily, SocketAddrUnix, SocketFlags, SocketType, bind, connect, listen, socket_with,
+    AddressFamily, Shutdown, SocketAddrUnix, SocketFlags, SocketType, bind, connect, listen,
+    shutdown, socket_with,
 };
 
 use super::card::find;
@@ -22,14 +25,25 @@ use crate::error::LinkError;
 /// Connections that are never taken stay in the queue; a full one tells nothing of the process.
 const BACKLOG: i32 = 4096;
 /// How often it is tried when the holder leaves at the same moment.
-const TRIES: usize = 5;
+const TRIES: usize = 40;
+/// Time between two tries: a name is free only when every copy of the socket is closed, and a child
+/// that the holder has just forked keeps one until it begins its program.
+const BETWEEN_TRIES: Duration = Duration::from_millis(5);
 /// Longest command that is told, in characters.
 const MOST_SHOWN: usize = 100;
 
 /// The right to send on a card, for as long as it lives.
 #[derive(Debug)]
 pub struct CardLock {
-    _socket: OwnedFd,
+    socket: OwnedFd,
+}
+
+impl Drop for CardLock {
+    /// Refuses whoever asks from now on, even where a child that was forked a moment ago still has
+    /// the socket open.
+    fn drop(&mut self) {
+        let _ = shutdown(&self.socket, Shutdown::Both);
+    }
 }
 
 /// The process that has locked a card.
@@ -51,12 +65,15 @@ impl CardLock {
     pub fn take(interface: &str) -> Result<Self, LinkError> {
         let failed = |error: Errno| LinkError::system(interface, "locking the card", error);
         let address = address(interface)?;
-        for _ in 0..TRIES {
+        for tried in 0..TRIES {
+            if tried > 0 {
+                thread::sleep(BETWEEN_TRIES);
+            }
             let socket = stream(SocketFlags::CLOEXEC).map_err(failed)?;
             match bind(&socket, &address) {
                 Ok(()) => {
                     listen(&socket, BACKLOG).map_err(failed)?;
-                    return Ok(Self { _socket: socket });
+                    return Ok(Self { socket });
                 }
                 Err(Errno::ADDRINUSE) => {}
                 Err(error) => return Err(failed(error)),
