@@ -26,6 +26,7 @@ pub fn diagnosis(data: &[u8]) {
             number: number as u64 + 1,
             fcs: None,
             truncated: item.flags & 0x04 != 0,
+            probe: None,
             bytes: item.bytes,
         });
         if item.flags & 0x08 != 0 {

@@ -4,6 +4,7 @@
 //! by an assertion here, such as "what was built reads as what was meant".
 
 mod capture;
+mod capture_filter;
 mod device;
 mod device_builder;
 mod diagnosis;
@@ -21,6 +22,7 @@ mod series;
 mod sii;
 
 pub use capture::capture;
+pub use capture_filter::capture_filter;
 pub use device_builder::device_builder;
 pub use diagnosis::diagnosis;
 pub use eni::eni;
@@ -41,6 +43,7 @@ pub type Target = (&'static str, fn(&[u8]));
 /// All targets.
 pub const TARGETS: &[Target] = &[
     ("capture", capture),
+    ("capture_filter", capture_filter),
     ("device_builder", device_builder),
     ("diagnosis", diagnosis),
     ("eni", eni),

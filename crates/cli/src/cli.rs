@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    completion, counters, demo, diagnose, explain, fault, foe, history, host, interfaces, lab, log,
-    online, plan, probe, reg, run, scan, schema, sdo, sii, sim, state,
+    bundle, capture, completion, counters, demo, diagnose, explain, fault, foe, history, host,
+    interfaces, lab, log, online, plan, probe, reg, run, scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -51,6 +51,10 @@ pub(crate) enum Command {
     Scan(scan::Arguments),
     /// What is wrong with a line: where, why, and what to do
     Diagnose(diagnose::Arguments),
+    /// What a capture shows beyond its verdict: the network, its dialogue, its timing, each frame
+    Capture(capture::Arguments),
+    /// What a bundle holds, and one without names to give away
+    Bundle(bundle::Arguments),
     /// What follows from a project or ENI file: frames, load, E-bus budget, clocks, doubts
     Plan(plan::Arguments),
     /// Network cards: link, driver, suitability, EtherCAT seen
@@ -113,6 +117,8 @@ impl Command {
             Self::Sii(arguments) => Some(&arguments.place.line),
             Self::Reg(arguments) => Some(&arguments.place.line),
             Self::Demo(_)
+            | Self::Capture(_)
+            | Self::Bundle(_)
             | Self::Plan(_)
             | Self::Interfaces(_)
             | Self::Host(_)
@@ -134,6 +140,8 @@ impl Command {
             Self::Run(arguments) => arguments.json,
             Self::Online(arguments) => arguments.json,
             Self::Diagnose(arguments) => arguments.json,
+            Self::Capture(arguments) => arguments.wants_json(),
+            Self::Bundle(arguments) => arguments.wants_json(),
             Self::Fault(arguments) => arguments.json,
             Self::Host(arguments) => arguments.json,
             Self::Interfaces(arguments) => arguments.json,

@@ -2,6 +2,7 @@
 
 use linesman_link::capture::CaptureError;
 use linesman_link::error::LinkError;
+use linesman_runtime::bundle::BundleError;
 use linesman_runtime::event_log::EventLogError;
 use linesman_runtime::part::PartFailure;
 use linesman_runtime::selector::SelectorError;
@@ -82,7 +83,7 @@ macro_rules! failures {
     };
 }
 
-failures!(CaptureError, EventLogError, LinkError, PartFailure, SelectorError);
+failures!(BundleError, CaptureError, EventLogError, LinkError, PartFailure, SelectorError);
 
 #[cfg(test)]
 mod tests {

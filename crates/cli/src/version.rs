@@ -14,3 +14,12 @@ pub(crate) const VERSION: &str = {
 pub(crate) fn tool() -> String {
     format!("linesman {VERSION}")
 }
+
+/// The first of the seeds that belong to this commit alone; `None` where it is not known.
+///
+/// They lie above a billion, where nothing is tuned: whoever changes the program changes its commit and gets others.
+pub(crate) fn first_fresh_seed() -> Option<u64> {
+    const TUNED: u64 = 1_000_000_000;
+    let commit = u64::from_str_radix(env!("LINESMAN_COMMIT"), 16).ok()?;
+    Some(TUNED + (commit % 1_000_000) * 1_000_000)
+}

@@ -84,6 +84,7 @@ impl<'de> Deserialize<'de> for Attachment {
     }
 }
 
+#[cfg(feature = "schema")]
 impl schemars::JsonSchema for Attachment {
     fn schema_name() -> std::borrow::Cow<'static, str> {
         "Attachment".into()

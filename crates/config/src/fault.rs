@@ -9,19 +9,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// What kind of trouble a fault or finding is; it decides who is called.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Debug,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
     /// Cables, contacts, supplies, devices.
@@ -40,10 +29,8 @@ pub enum Class {
 macro_rules! catalogue {
     ($($variant:ident $name:literal $class:ident $meaning:literal;)*) => {
         /// A cause of trouble on a network.
-        #[derive(
-            Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize,
-            schemars::JsonSchema,
-        )]
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
         pub enum FaultName {
             $(
                 #[doc = $meaning]

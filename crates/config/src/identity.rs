@@ -9,9 +9,8 @@ pub use linesman_proto::sii::Identity;
 use serde::{Deserialize, Serialize};
 
 /// How a found revision is compared with the planned one.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum RevisionRule {
     /// Any revision will do.

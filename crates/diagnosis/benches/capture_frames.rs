@@ -7,7 +7,7 @@
 #![allow(clippy::disallowed_methods, clippy::disallowed_macros, reason = "it measures and prints")]
 #![allow(clippy::disallowed_types, reason = "it measures")]
 
-#[path = "../tests/support/mod.rs"]
+#[path = "../tests/evidence/support/mod.rs"]
 mod support;
 
 use std::time::Instant as Clock;
@@ -42,6 +42,7 @@ fn main() {
                 number,
                 fcs: None,
                 truncated: false,
+                probe: None,
                 bytes: &cycle[number as usize % cycle.len()],
             });
         }

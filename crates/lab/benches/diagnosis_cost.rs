@@ -140,6 +140,7 @@ fn play(recorded: &Recorded, seconds: u64) -> (f64, Engine) {
             number,
             fcs: None,
             truncated: false,
+            probe: None,
             bytes: &frame.bytes,
         });
         while engine.poll_probe().is_some() {}

@@ -184,19 +184,36 @@ impl Choice {
     }
 }
 
-/// Whether two faults can both be seen: neither lies behind the other.
-#[must_use]
-pub fn are_apart(tree: &Tree, one: &Choice, other: &Choice) -> bool {
-    let node = |choice: &Choice| match (choice.device, choice.link) {
+/// Node that a choice sits in, or whose upstream link it sits on; `None` for a fault that has no place of its own.
+fn node_of(tree: &Tree, choice: &Choice) -> Option<usize> {
+    match (choice.device, choice.link) {
         (Some(id), _) => Some(id.index()),
         (None, Some(link)) => tree.links()[link].downstream.node(),
         (None, None) => None,
-    };
-    match (node(one), node(other)) {
+    }
+}
+
+/// True if neither of two faults lies behind the other, nor both at one parent.
+#[must_use]
+pub fn are_apart(tree: &Tree, one: &Choice, other: &Choice) -> bool {
+    match (node_of(tree, one), node_of(tree, other)) {
         (Some(one), Some(other)) => {
             let related = |a: usize, b: usize| a == b || tree.is_downstream_of(a, b);
             !related(one, other) && !related(other, one) && tree.parent(one) != tree.parent(other)
         }
+        (None, _) | (_, None) => false,
+    }
+}
+
+/// True if `one` lies behind `other` as seen from the MainDevice, in another place than that.
+#[must_use]
+pub fn is_behind(tree: &Tree, one: &Choice, other: &Choice) -> bool {
+    match (node_of(tree, one), node_of(tree, other)) {
+        (Some(node), Some(before)) if node == before => {
+            // The link of a device lies before the device itself.
+            one.link.is_none() && other.link.is_some()
+        }
+        (Some(node), Some(before)) => tree.is_downstream_of(node, before),
         (None, _) | (_, None) => false,
     }
 }

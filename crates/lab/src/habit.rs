@@ -13,7 +13,20 @@ use linesman_maindevice::{CounterPoll, Options, Polling, Rounds};
 use linesman_proto::time::Span;
 
 /// A habit.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
+#[derive(
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Debug,
+    Default,
+    serde::Serialize,
+    serde::Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Habit {
     /// Ours: AL status, DL status and error counters of each SubDevice every 100 ms, AL status of all in each cycle.
     #[default]

@@ -10,6 +10,7 @@ pub mod drawing;
 pub mod habit;
 pub mod lab;
 pub mod options;
+pub mod part;
 pub mod replay;
 pub mod score;
 mod soem;

@@ -1,5 +1,6 @@
 //! Options of a lab.
 
+use linesman_diagnosis::model::reported::PartExchange;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
@@ -46,6 +47,8 @@ pub struct LabOptions {
     pub begin: Begin,
     /// What the report says was looked at; empty for the segment's name.
     pub source: String,
+    /// Parts that were exchanged before, on account of an earlier diagnosis.
+    pub exchanges: Vec<PartExchange>,
 }
 
 impl Default for LabOptions {
@@ -63,6 +66,7 @@ impl Default for LabOptions {
             log: false,
             begin: Begin::Run,
             source: String::new(),
+            exchanges: Vec::new(),
         }
     }
 }

@@ -33,6 +33,7 @@
 //! | run it in a loop of one's own | [`Segment::start`] and [`SteppedRun::cycle`] |
 //! | see whether data are good | [`Io::quality`], [`Io::state`], [`Io::network_state`] |
 //! | ask beside the cycle | [`Segment::services`]: objects (SDO), files (FoE), EEPROM (SII), registers, states |
+//! | ask without a run | [`Segment::serve`]: the same services on a line that is only scanned |
 //! | hear what is wrong | [`Segment::run_diagnosed`], or [`RunOptions::diagnosed`] and [`SteppedRun::findings`] |
 //! | test against faults | [`Segment::simulation`]: [`Simulation::inject`], [`Simulation::heal`] |
 //! | drive a segment with another MainDevice | [`VirtualWire`] |
@@ -85,6 +86,7 @@ mod options;
 mod plan;
 mod record;
 mod segment;
+mod served_line;
 mod services;
 mod simulation;
 mod stepped_run;
@@ -121,6 +123,7 @@ pub use options::RunOptions;
 pub use plan::{Plan, Scan};
 pub use record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
 pub use segment::{Segment, open};
+pub use served_line::ServedLine;
 pub use services::{ObjectValue, PendingAnswer, ReadState, RegisterValue, RequestError, Services};
 pub use simulation::Simulation;
 pub use stepped_run::SteppedRun;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use linesman_config::eni::Eni;
 use linesman_config::inventory::Inventory;
+use linesman_config::project::Project;
 use linesman_proto::time::Span;
 use linesman_runtime::run::PlanChoices;
 use linesman_session::image::{Value, find_device};
@@ -44,6 +45,8 @@ pub struct Plan {
     id: PlanId,
     /// The scan that it was made of, if it was.
     found: Option<Box<Inventory>>,
+    /// The project that it was made of, if it was.
+    project: Option<Box<Project>>,
 }
 
 impl Plan {
@@ -179,6 +182,16 @@ impl Plan {
         choices.plan_of(&found).map_err(Error::Plan)
     }
 
+    /// The plan of a project.
+    pub(crate) fn of_project(plan: linesman_config::plan::Plan, project: Project) -> Self {
+        Self { project: Some(Box::new(project)), ..plan.into() }
+    }
+
+    /// The project that it was made of.
+    pub(crate) fn project(&self) -> Option<&Project> {
+        self.project.as_deref()
+    }
+
     /// The plan itself.
     #[must_use]
     pub const fn as_plan(&self) -> &linesman_config::plan::Plan {
@@ -195,6 +208,6 @@ impl fmt::Display for Plan {
 
 impl From<linesman_config::plan::Plan> for Plan {
     fn from(plan: linesman_config::plan::Plan) -> Self {
-        Self { id: PlanId::of(&plan), plan, found: None }
+        Self { id: PlanId::of(&plan), plan, found: None, project: None }
     }
 }

@@ -32,7 +32,8 @@ use crate::handle::PlanId;
 use crate::services::{ServiceOrder, ServiceOrders};
 use crate::stepped_run::Caller;
 use crate::{
-    Application, Error, Io, Next, Plan, RunOptions, Scan, Services, Simulation, SteppedRun,
+    Application, Error, Io, Next, Plan, RunOptions, Scan, ServedLine, Services, Simulation,
+    SteppedRun,
 };
 
 /// Opens a line: `eth0`, `eth0+eth1` (a ring) or `sim:line.toml` (a virtual segment, in virtual time
@@ -163,7 +164,17 @@ impl Segment {
         Ok(Scan { inventory })
     }
 
-    /// The plan of a project (TOML), if what it says is there; or of an ENI file.
+    /// Scans the line and serves its SubDevices, without a run: objects, files, EEPROM, registers, states.
+    ///
+    /// # Errors
+    /// When nobody answers.
+    pub fn serve(&mut self) -> Result<ServedLine<'_>, Error> {
+        let services = self.services.clone();
+        ServedLine::open(self.line.transport(), services, &self.orders, &self.stop)
+    }
+
+    /// The plan of a project (TOML), if what it says is there; or of an ENI file. A run of it with the diagnosis is held
+    /// against the project: names, identities, wiring.
     ///
     /// # Errors
     /// When the file is wrong, or another SubDevice is there than it says.
@@ -179,14 +190,14 @@ impl Segment {
         // One that chooses more than who is where is planned from what it says.
         if project.chooses() {
             let file = PlanFile::open(path).map_err(|error| refuse(error.to_string()))?;
-            return Ok(file.plan.into());
+            return Ok(Plan::of_project(file.plan, file.project.unwrap_or(project)));
         }
-        let PlanSource::Found(make) = PlanChoices::default().project(project) else {
+        let PlanSource::Found(make) = PlanChoices::default().project(project.clone()) else {
             return Err(refuse("it makes no plan".to_owned()));
         };
         let inventory = running::scan(self.line.transport(), PATIENCE, &self.stop)?;
         let make: MakePlan = make;
-        Ok(make(&inventory).map_err(refuse)?.into())
+        Ok(Plan::of_project(make(&inventory).map_err(refuse)?, project))
     }
 
     /// Brings the line up and calls `application` once a cycle, until it stops, or somebody calls
@@ -273,9 +284,11 @@ impl Segment {
         notes: SyncSender<Note>,
     ) -> Result<(Started<'_, A>, PlanId, Rc<Handoff>), Error> {
         let (id, handoff) = (plan.id(), Rc::<Handoff>::default());
+        let project = plan.project().cloned();
         let plan = plan.for_run(&options)?;
         let setup = || Setup {
             input: InputKind::Driven,
+            project,
             exchange: plan.exchange(),
             source: self.place.clone(),
             host_counters: true,

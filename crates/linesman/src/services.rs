@@ -82,7 +82,8 @@ pub struct ReadState {
 
 /// Asks SubDevices beside the cycle, from the application or from another thread: [`Segment::services`](
 /// crate::Segment::services). Copies ask the same line. The cycle waits for nobody: requests are taken once a cycle,
-/// and sent in its gaps. A request that is made while the line does not run waits for the next run.
+/// and sent in its gaps. A request that is made while the line does not run waits for the next run, or for
+/// [`ServedLine::ask`](crate::ServedLine::ask).
 #[derive(Clone, Debug)]
 pub struct Services {
     orders: Sender<ServiceOrder>,

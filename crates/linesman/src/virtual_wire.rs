@@ -29,8 +29,9 @@ impl VirtualWire {
     pub fn new(file: &SegmentFile) -> Result<Self, Error> {
         let segment = build(file, &Error::Segment)?;
         let source = format!("sim:{}", file.name);
+        // The frames are those of another MainDevice: its orders are not known.
         let setup =
-            Setup { input: InputKind::Driven, host_counters: true, source, ..Setup::default() };
+            Setup { input: InputKind::Listened, host_counters: true, source, ..Setup::default() };
         Ok(Self { segment, engine: Engine::new(setup), frames: 0 })
     }
 

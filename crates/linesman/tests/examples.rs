@@ -85,9 +85,11 @@ fn findings_example_tells_opening_closing_place_and_evidence() {
 #[test]
 fn own_maindevice_example_counts_who_is_there_before_and_after_the_fault() {
     let devices = [("K1", "EK1100"), ("Buttons", "EL1008"), ("Lamps", "EL2008")];
-    let (counts, _) = own_maindevice::poll(&machine(&devices)).unwrap();
+    let (counts, diagnosis) = own_maindevice::poll(&machine(&devices)).unwrap();
     assert_eq!(counts.first(), Some(&3));
     assert_eq!(counts.last(), Some(&2));
+    // The diagnosis listens beside another MainDevice, and says which by its requests.
+    assert!(diagnosis.main_device.is_some());
 }
 
 /// Runs an example as cargo builds it before it runs all tests of a crate; gives what it prints.

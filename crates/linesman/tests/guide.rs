@@ -5,6 +5,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 const BEGIN: &str = "<!-- code: ";
 
@@ -52,4 +53,20 @@ fn programs_of_the_guide_are_those_of_the_examples() {
         let write = "LINESMAN_WRITE_PAGES=1 cargo test -p linesman --test guide";
         assert!(page == wanted, "{} is stale: run `{write}`", path.display());
     }
+}
+
+#[test]
+fn pysoem_programs_of_the_guide_parse_and_use_names_that_there_are() {
+    let page = crate_folder().join("../../docs/guide/coming-from.md");
+    // Where pysoem is installed for interop, its Python checks the names, too.
+    let python = std::env::var_os("LINESMAN_PYTHON").unwrap_or_else(|| "python3".into());
+    let script = crate_folder().join("tests/pysoem_names.py");
+    let Ok(run) = Command::new(&python).arg(script).arg(page).output() else {
+        eprintln!("skipped: no {}", python.display());
+        return;
+    };
+    let (said, error) =
+        (String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+    assert!(run.status.success() && said.starts_with("3 blocks"), "{said}{error}");
+    eprint!("{said}");
 }

@@ -158,3 +158,51 @@ fn device_of_another_plan_is_refused() {
     assert!(text.contains("2 SubDevices") && text.contains("3 SubDevices"), "{text}");
     run.stop().unwrap();
 }
+
+#[test]
+fn line_that_is_only_scanned_answers_registers_sii_states_and_objects() {
+    let mut segment = Segment::simulated(&SegmentFile::in_a_row("machine", 1, &DEVICES)).unwrap();
+    let mut line = segment.serve().unwrap();
+    assert_eq!(line.inventory().devices.len(), 3);
+    let sensor = line.device("EL3104").unwrap();
+    let address = register::STATION_ADDRESS.address;
+    let station: u16 = line.ask(|services| services.register_read(sensor, address)).unwrap();
+    assert_eq!(station, 0x1002);
+    let sii = line.ask(|services| services.sii_read(sensor)).unwrap();
+    assert_eq!(sii.get(16..20), Some(&2_u32.to_le_bytes()[..]), "vendor, word 8");
+    let state = line.ask(|services| services.state(sensor)).unwrap();
+    assert_eq!(state.status.state(), linesman::StateValue::Known(AlState::Init), "left there");
+    let early = line.ask(|services| services.sdo_read::<u32>(sensor, IDENTITY, 1)).unwrap_err();
+    assert!(early.to_string().contains("takes PREOP"), "{early}");
+    line.ask(|services| services.enter(sensor, AlState::PreOp)).unwrap();
+    let vendor: u32 = line.ask(|services| services.sdo_read(sensor, IDENTITY, 1)).unwrap();
+    assert_eq!(vendor, 2);
+    // A run follows on the same line.
+    let plan = segment.scan().unwrap().plan().unwrap();
+    let mut run = segment.start(plan, RunOptions::us(1_000)).unwrap();
+    let settled = (0..5_000).any(|_| run.cycle().is_some_and(|io| io.is_settled()));
+    assert!(settled);
+    run.stop().unwrap();
+}
+
+#[test]
+fn request_of_another_thread_is_answered_by_the_next_that_is_asked_without_a_run() {
+    let mut segment = Segment::simulated(&SegmentFile::in_a_row("machine", 1, &DEVICES)).unwrap();
+    let beside = segment.services();
+    let mut line = segment.serve().unwrap();
+    let lamps = line.device("EL2008").unwrap();
+    let mut pending = beside.state(lamps);
+    assert!(pending.poll().is_none());
+    line.ask(|services| services.sii_read(lamps)).unwrap();
+    assert!(pending.poll().unwrap().is_ok());
+}
+
+#[test]
+fn device_of_another_plan_is_refused_without_a_run() {
+    let mut other = Segment::simulated(&SegmentFile::in_a_row("other", 1, &DEVICES[..2])).unwrap();
+    let sensor = other.serve().unwrap().device("EL3104").unwrap();
+    let mut segment = Segment::simulated(&SegmentFile::in_a_row("machine", 1, &DEVICES)).unwrap();
+    let mut line = segment.serve().unwrap();
+    let refused = line.ask(|services| services.state(sensor));
+    assert!(matches!(refused, Err(Error::Service(RequestError::OtherPlan { .. }))), "{refused:?}");
+}

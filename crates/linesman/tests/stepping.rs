@@ -4,6 +4,7 @@
 
 use linesman::prelude::*;
 use linesman::{FaultEntry, FaultName, FindingChange};
+use linesman_config::project::Project;
 
 const DEVICES: [(&str, &str); 3] = [("K1", "EK1100"), ("Buttons", "EL1008"), ("Lamps", "EL2008")];
 
@@ -118,4 +119,75 @@ fn outputs_that_are_called_old_are_withheld() {
     }
     assert!(withheld > 900, "{withheld}");
     run.stop().unwrap();
+}
+
+/// A coupler behind a coupler, the second one as it should be, or plugged in by its OUT port.
+fn press(is_reversed: bool) -> Segment {
+    let device = |name, kind, on| {
+        format!("[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    let mut text = [
+        "name = \"press\"\n".to_owned(),
+        device("K1", "EK1100", "maindevice"),
+        device("T1", "EL2008", "K1.B"),
+        device("K2", "EK1100", "K1.C"),
+        device("T2", "EL1008", "K2.B"),
+    ]
+    .concat();
+    if is_reversed {
+        text += "[[fault]]\nkind = \"ports-swapped\"\ndevice = \"K2\"\n";
+    }
+    Segment::simulated(&SegmentFile::parse(&text).unwrap()).unwrap()
+}
+
+/// Findings, with their places, of a line that is run by the project in a text.
+fn found_by(project: &str, segment: &mut Segment) -> Vec<(String, String)> {
+    let path = std::env::temp_dir().join(format!(
+        "linesman-{}-{:?}.toml",
+        std::process::id(),
+        std::thread::current().id()
+    ));
+    std::fs::write(&path, project).unwrap();
+    let plan = segment.load(&path);
+    std::fs::remove_file(&path).unwrap();
+    let mut run = segment.start(plan.unwrap(), RunOptions::us(1_000).diagnosed()).unwrap();
+    for _ in 0..3_000 {
+        run.cycle();
+    }
+    let diagnosis = run.stop().unwrap().diagnosis.unwrap();
+    let told = |one: &linesman::FindingReport| (one.code.clone(), one.place.to_string());
+    diagnosis.findings.iter().map(told).collect()
+}
+
+/// The project of the line as it should be; with `choices` one SubDevice is to stay in PREOP, so that the plan is made of
+/// the project alone.
+fn press_project(choices: bool) -> String {
+    let scan = press(false).scan().unwrap();
+    let mut project = Project::from_inventory("press", scan.inventory());
+    if choices {
+        project.devices[3].state = Some("PREOP".to_owned());
+    }
+    assert_eq!(project.chooses(), choices);
+    project.to_toml()
+}
+
+#[test]
+fn line_wired_otherwise_than_the_loaded_project_is_reported() {
+    for choices in [false, true] {
+        let project = press_project(choices);
+        assert_eq!(found_by(&project, &mut press(false)), []);
+        let reversed = [("C304".to_owned(), "SubDevice 3".to_owned())];
+        assert_eq!(found_by(&project, &mut press(true)), reversed, "choices: {choices}");
+    }
+}
+
+#[test]
+fn other_device_than_a_project_with_choices_has_is_reported() {
+    let file = SegmentFile::in_a_row("press", 1, &[("K1", "EK1100"), ("T1", "EL1008")]);
+    let scan = Segment::simulated(&file).unwrap().scan().unwrap();
+    let mut project = Project::from_inventory("press", scan.inventory());
+    project.devices[0].state = Some("PREOP".to_owned());
+    let other = SegmentFile::in_a_row("press", 1, &[("K1", "EK1100"), ("T1", "EL2008")]);
+    let found = found_by(&project.to_toml(), &mut Segment::simulated(&other).unwrap());
+    assert!(found.iter().any(|(_, place)| place == "SubDevice 2"), "{found:?}");
 }

@@ -68,6 +68,12 @@ impl UnixTime {
         self.local_as("%Y-%m-%d %H:%M:%S%.3f %:z")
     }
 
+    /// For people, to the nanosecond: `2026-03-01 11:16:50.182345678 +01:00`.
+    #[must_use]
+    pub fn local_exact(self) -> String {
+        self.local_as("%Y-%m-%d %H:%M:%S%.9f %:z")
+    }
+
     /// Its date in the time zone of this host, with the offset from UTC: `2026-03-01 +01:00`.
     #[must_use]
     pub fn local_date(self) -> String {
@@ -78,6 +84,12 @@ impl UnixTime {
     #[must_use]
     pub fn local_time_of_day(self) -> String {
         self.local_as("%H:%M:%S%.3f")
+    }
+
+    /// For names of files, in the time zone of this host: `20260301111650`.
+    #[must_use]
+    pub fn local_digits(self) -> String {
+        self.local_as("%Y%m%d%H%M%S")
     }
 
     fn local_as(self, format: &str) -> String {

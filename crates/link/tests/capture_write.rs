@@ -38,6 +38,8 @@ fn two_cards() -> Vec<u8> {
     }
     let card = CaptureInterfaceId(1);
     writer.write_statistics(card, UnixTime::from_nanos(START), 10, 6).unwrap();
+    let (card, end) = (CaptureInterfaceId(0), UnixTime::from_nanos(START + 2_000_000));
+    writer.write_statistics(card, end, 5, 0).unwrap();
     writer.finish().unwrap()
 }
 
@@ -58,6 +60,8 @@ fn a_written_capture_reads_back_and_has_the_same_bytes_each_time() {
     assert_eq!(first.description.as_deref(), Some("card A"));
     assert_eq!(first.resolution, TimeResolution::NANOSECOND);
     assert_eq!((second.description.as_deref(), second.drops), (None, Some(6)));
+    let end = UnixTime::from_nanos(START + 2_000_000);
+    assert_eq!((first.ended, second.ended), (Some(end), Some(UnixTime::from_nanos(START))));
 
     let (frames, end) = read(&file).unwrap();
     assert!(end.complete(), "{end}");

@@ -250,7 +250,7 @@ mod tests {
         }
     }
 
-    // proves: FRM-15 partial
+    // proves: FRM-15
     #[test]
     fn working_counter_increments() {
         use Command::*;

@@ -14,6 +14,7 @@
 
 pub mod address;
 pub mod command;
+pub mod esl;
 pub mod ethernet;
 pub mod frame;
 pub mod mailbox;

@@ -121,7 +121,7 @@ impl<T> IndexMut<Port> for PortMap<T> {
 mod tests {
     use super::*;
 
-    // proves: ESC-02 partial, ESC-09 partial, HW-07 partial
+    // proves: ESC-02 partial, ESC-09, HW-07 partial
     #[test]
     fn a_frame_meets_the_ports_in_the_order_0_3_1_2() {
         let mut port = Port::A;

@@ -78,7 +78,7 @@ fn the_eleven_planned_frames_have_their_size_time_and_load() {
     assert!((load(195) - 0.88).abs() <= 0.01);
 }
 
-// proves: FRM-13 partial: the frame as we build it, not the capture
+// proves: FRM-13
 #[test]
 fn the_header_word_of_the_frame_of_516_bytes() {
     let frame = frame(&[4, 4, 3, 150, 33, 220, 2]);
@@ -192,7 +192,7 @@ fn codes_of_start_up_and_running_are_explained() {
     }
 }
 
-// proves: SYN-30
+// proves: SYN-30 partial: that each code has both
 #[test]
 fn codes_of_lost_synchronisation_lead_to_cause_and_action() {
     for code in [0x2D, 0x30, 0x32, 0x1A, 0x33, 0x34, 0x35, 0x36, 0x37] {

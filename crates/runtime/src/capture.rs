@@ -1,21 +1,58 @@
-//! A capture as the diagnosis sees it: frames in the order of the file, in times of the run.
+//! A capture as the diagnosis sees it: frames in the order of the file, in times of the run. The files of one ring are one
+//! capture.
 
-use std::path::Path;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
 
 use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_link::capture::{
-    CaptureEnd, CaptureError, CaptureInterface, CaptureReader, FrameDirection, RunClock,
-    SkippedLinkType,
+    CaptureEnd, CaptureError, CaptureInterface, CaptureInterfaceId, CaptureReader, CapturedFrame,
+    FrameDirection, FrameNumber, RunClock, SkippedLinkType,
 };
 use linesman_link::input::Input;
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_proto::time::{Instant, Span};
 
+/// Longest time after the last frame that a recorder is believed to have recorded nothing.
+const LONGEST_SILENCE: Span = Span::s(86_400);
+
 /// A capture that is being read.
 pub struct Capture {
     reader: CaptureReader,
     clock: RunClock,
+    files: RecordingFiles,
+}
+
+/// A frame of a capture, twice.
+#[derive(Clone, Copy, Debug)]
+pub struct CaptureItem<'a> {
+    /// As the file has it; numbered through where there are several.
+    pub captured: CapturedFrame<'a>,
+    /// As the diagnosis sees it.
+    pub seen: FrameSeen<'a>,
+    /// The interface that saw it.
+    pub interface: &'a CaptureInterface,
+}
+
+/// The files of a capture.
+#[derive(Default)]
+struct RecordingFiles {
+    /// Those to come.
+    rest: VecDeque<PathBuf>,
+    count: usize,
+    /// Frames in those before the present one.
+    frames_before: u64,
+    /// Frames that their recorders lost.
+    missed: u64,
+    /// All interfaces so far, equal ones of several files once.
+    interfaces: Vec<CaptureInterface>,
+    /// Which of them each interface of the present file is.
+    numbers: Vec<u32>,
+    /// The end of the first file that could not be read to its end.
+    early: Option<CaptureEnd>,
+    /// Why a later file could not be opened.
+    fault: Option<CaptureError>,
 }
 
 impl Capture {
@@ -25,6 +62,19 @@ impl Capture {
     /// When it is none, or is damaged in its first block.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, CaptureError> {
         Self::of(Input::open(path)?)
+    }
+
+    /// Opens the files of one recording, in the order of their first frames. Frames are numbered through.
+    ///
+    /// # Errors
+    /// When one of them is no capture, or is damaged in its first block.
+    pub fn of_files(paths: &[PathBuf]) -> Result<Self, CaptureError> {
+        let mut rest = VecDeque::from(in_order(paths)?);
+        let first = rest.pop_front().unwrap_or_default();
+        let mut capture = Self::open(first)?;
+        capture.files.count += rest.len();
+        capture.files.rest = rest;
+        Ok(capture)
     }
 
     /// Reads a capture from an input. Of a file the run begins with the earliest frame of any
@@ -37,30 +87,50 @@ impl Capture {
             true => RunClock::for_file(input.name())?,
             false => RunClock::default(),
         };
-        Ok(Self { clock, reader: CaptureReader::of(input)? })
+        let files = RecordingFiles { count: 1, ..RecordingFiles::default() };
+        Ok(Self { clock, reader: CaptureReader::of(input)?, files })
     }
 
-    /// The share of the file that has been read, 0 to 1; `None` where nobody knows the whole.
+    /// The share that has been read, 0 to 1; `None` where nobody knows the whole.
     #[must_use]
     pub fn progress(&self) -> Option<f64> {
-        self.reader.progress()
+        let done = self.files.count - self.files.rest.len() - 1;
+        Some((done as f64 + self.reader.progress()?) / self.files.count as f64)
     }
 
     /// The next frame; `None` at the end. Its bytes are borrowed: nothing is copied.
     #[inline]
     pub fn next_frame(&mut self) -> Option<FrameSeen<'_>> {
-        let frame = self.reader.next_frame()?;
-        let moment = self.clock.place(frame.interface, frame.time);
-        Some(FrameSeen {
+        self.next_captured().map(|item| item.seen)
+    }
+
+    /// The next frame as the file has it, and as the diagnosis sees it.
+    #[inline]
+    pub fn next_captured(&mut self) -> Option<CaptureItem<'_>> {
+        while !self.reader.advance() {
+            self.reader = self.files.after(&self.reader)?;
+        }
+        let Self { reader, clock, files } = self;
+        if reader.interfaces().len() > files.numbers.len() {
+            files.describe(reader.interfaces());
+        }
+        let mut captured = reader.frame()?;
+        captured.number = FrameNumber(captured.number.0 + files.frames_before);
+        captured.interface = files.number(captured.interface);
+        let at = clock.place(captured.interface, captured.time).at;
+        let interface = files.interfaces.get(captured.interface.0 as usize)?;
+        let seen = FrameSeen {
             network: Network::default(),
             path: None,
-            direction: direction(frame.direction),
-            time: moment.at,
-            number: frame.number.0,
-            fcs: frame.fcs,
-            truncated: frame.truncated,
-            bytes: frame.bytes,
-        })
+            direction: direction(captured.direction),
+            time: at,
+            number: captured.number.0,
+            fcs: captured.fcs,
+            truncated: captured.truncated,
+            probe: captured.probe,
+            bytes: captured.bytes,
+        };
+        Some(CaptureItem { captured, seen, interface })
     }
 
     /// The start of the run by the capture's clock.
@@ -69,10 +139,20 @@ impl Capture {
         self.clock.origin()
     }
 
-    /// The latest time so far.
+    /// The latest time so far: that of a frame, or that up to which the recorder says it has recorded.
     #[must_use]
     pub fn latest(&self) -> Instant {
-        self.clock.latest()
+        let last = self.clock.latest();
+        let ended = self.reader.interfaces().iter().filter_map(|interface| interface.ended);
+        // Who says it recorded for days after the last frame has another clock.
+        let is_sound = |at: &Instant| at.since(last) < LONGEST_SILENCE;
+        ended.map(|time| self.clock.at(time)).filter(is_sound).fold(last, Instant::max)
+    }
+
+    /// Frames that the recorder says it has lost: they are missing in the files, not on the line.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.files.missed.saturating_add(missed(&self.reader))
     }
 
     /// How many frames were earlier than one before them, and by how much at most.
@@ -81,23 +161,99 @@ impl Capture {
         self.clock.backward()
     }
 
-    /// How it ended; `None` while there may be more.
+    /// How it ended; `None` while there may be more. Of several files the first that could not be read to its end
+    /// counts.
     #[must_use]
     pub fn end(&self) -> Option<&CaptureEnd> {
-        self.reader.end()
+        self.reader.end().map(|end| self.files.early.as_ref().unwrap_or(end))
     }
 
-    /// The interfaces that were described so far.
+    /// A later file that could not be opened; it ended the capture.
+    #[must_use]
+    pub const fn fault(&self) -> Option<&CaptureError> {
+        self.files.fault.as_ref()
+    }
+
+    /// The interfaces that were described so far, those that several files describe in the same way once.
     #[must_use]
     pub fn interfaces(&self) -> &[CaptureInterface] {
-        self.reader.interfaces()
+        &self.files.interfaces
     }
 
-    /// Frames that were passed over because of their link type.
+    /// Frames of the present file that were passed over because of their link type.
     #[must_use]
     pub fn skipped(&self) -> &[SkippedLinkType] {
         self.reader.skipped()
     }
+}
+
+impl RecordingFiles {
+    /// Opens the file after one that has ended; `None` when it was the last.
+    #[cold]
+    fn after(&mut self, ended: &CaptureReader) -> Option<CaptureReader> {
+        let end = ended.end()?;
+        if !end.complete() {
+            self.early.get_or_insert_with(|| end.clone());
+        }
+        let next = self.rest.pop_front()?;
+        self.frames_before += end.frames;
+        self.missed = self.missed.saturating_add(missed(ended));
+        self.numbers.clear();
+        match CaptureReader::open(next) {
+            Ok(reader) => Some(reader),
+            Err(error) => {
+                self.fault = Some(error);
+                self.rest.clear();
+                None
+            }
+        }
+    }
+
+    /// Takes the interfaces of the present file.
+    #[cold]
+    fn describe(&mut self, described: &[CaptureInterface]) {
+        for interface in &described[self.numbers.len()..] {
+            let is_same = |known: &CaptureInterface| {
+                known.name == interface.name
+                    && known.description == interface.description
+                    && known.link_type == interface.link_type
+            };
+            // Two of one file are two, however alike.
+            let taken = self.numbers.clone();
+            let mut known = self.interfaces.iter().zip(0..);
+            let found = known.find(|(known, no)| is_same(known) && !taken.contains(no));
+            let no = found.map(|(_, no)| no).unwrap_or_else(|| {
+                self.interfaces.push(interface.clone());
+                self.interfaces.len() as u32 - 1
+            });
+            self.numbers.push(no);
+        }
+    }
+
+    fn number(&self, interface: CaptureInterfaceId) -> CaptureInterfaceId {
+        let number = self.numbers.get(interface.0 as usize);
+        number.map_or(interface, |number| CaptureInterfaceId(*number))
+    }
+}
+
+/// Frames that the recorder of a file says it has lost.
+fn missed(reader: &CaptureReader) -> u64 {
+    let told = reader.interfaces().iter().filter_map(|interface| interface.drops);
+    told.fold(0, u64::saturating_add)
+}
+
+/// Files in the order of their first frames; those without a time stay where they are.
+fn in_order(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CaptureError> {
+    let mut dated = Vec::new();
+    let mut latest = None;
+    for path in paths {
+        let mut reader = CaptureReader::open(path)?;
+        let first = reader.next_frame().and_then(|frame| frame.time);
+        latest = first.or(latest);
+        dated.push((latest, path.clone()));
+    }
+    dated.sort_by_key(|(first, _)| *first);
+    Ok(dated.into_iter().map(|(_, path)| path).collect())
 }
 
 /// The same word of the diagnosis.

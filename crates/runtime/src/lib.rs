@@ -2,12 +2,13 @@
 //!
 //! [`selector`] says what a word like `eth0+eth1` means, wherever it is written; [`capture`] reads
 //! files, [`transport`] is where frames go, [`drive`] runs a MainDevice there, [`listen`] hears what is on a card, [`question_socket`]
-//! asks SubDevices there, [`host_watch`] asks about a card, [`record`] writes what was seen to a file. [`serve`] puts a segment on real
+//! asks SubDevices there, [`host_watch`] asks about a card, [`record`] writes what was seen to a file, [`ring_recorder`] to a ring of files. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`truth_writer`] writes down what really happened, [`names`] says where. [`plan_file`] reads
-//! the file that a line is planned with, [`named_files`] the files that a file names. [`stop`] is the wish to stop,
+//! the file that a line is planned with, [`named_files`] the files that a file names. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop,
 //! [`part`] says that a part of a command has failed.
 
+pub mod bundle;
 pub mod capture;
 pub mod control;
 mod control_socket;
@@ -23,10 +24,12 @@ pub mod part;
 pub mod plan_file;
 pub mod question_socket;
 pub mod record;
+pub mod ring_recorder;
 pub mod run;
 pub mod selector;
 pub mod serve;
 pub mod service;
+pub mod service_session;
 pub mod stop;
 #[cfg(feature = "journald")]
 pub mod system_log;

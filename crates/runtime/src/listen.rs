@@ -128,6 +128,7 @@ impl CardListener {
                     number: *frames,
                     fcs: None,
                     truncated: frame.truncated,
+                    probe: None,
                     bytes: frame.bytes,
                 }));
             }

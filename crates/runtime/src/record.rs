@@ -24,6 +24,9 @@ pub struct Recorder {
     start: UnixTime,
     cards: [Option<CaptureInterfaceId>; 2],
     names: Vec<String>,
+    /// Frames that were written, and those that passed and were not shown.
+    written: [u64; 2],
+    missed: u64,
     /// The first thing that went wrong; nothing is written after it.
     fault: Option<CaptureWriteError>,
     file: WatchedFile,
@@ -46,7 +49,18 @@ impl Recorder {
         let writer = PcapngWriter::new(file, application)?;
         let (names, file) = (names.to_vec(), WatchedFile::at(path));
         let look_at = Instant::ZERO;
-        Ok(Self { writer, start, cards: [None; 2], names, fault: None, file, look_at })
+        let (written, missed) = ([0; 2], 0);
+        Ok(Self {
+            writer,
+            start,
+            cards: [None; 2],
+            names,
+            written,
+            missed,
+            fault: None,
+            file,
+            look_at,
+        })
     }
 
     /// Writes a frame. What goes wrong is told by [`fault`](Self::fault).
@@ -58,6 +72,11 @@ impl Recorder {
             self.look_at = frame.time + LOOK_EVERY;
             self.fault = self.file.check().err().map(Into::into);
         }
+    }
+
+    /// Notes frames that passed and were not shown; whoever reads the file is told of them.
+    pub const fn missed(&mut self, count: u64) {
+        self.missed = self.missed.saturating_add(count);
     }
 
     /// What went wrong first; nothing was written after it.
@@ -78,6 +97,7 @@ impl Recorder {
             Direction::Unknown => FrameDirection::Unknown,
         };
         let time = self.start + frame.time.since(Instant::ZERO);
+        self.written[path.index()] += 1;
         self.writer.write_frame(&FrameToWrite::new(interface, time, direction, frame.bytes))
     }
 
@@ -92,14 +112,22 @@ impl Recorder {
         Ok(interface)
     }
 
-    /// Ends the file.
+    /// Ends the file, with the time `until` which it was recorded, frames or not.
     ///
     /// # Errors
     /// What went wrong first.
-    pub fn finish(self) -> Result<(), CaptureWriteError> {
+    pub fn finish(mut self, until: Instant) -> Result<(), CaptureWriteError> {
         match self.fault {
             Some(fault) => Err(fault),
             None => {
+                let until = self.start + until.since(Instant::ZERO);
+                // Of which card the missed ones were is not known.
+                let mut missed = self.missed;
+                for (interface, written) in self.cards.into_iter().zip(self.written) {
+                    let Some(interface) = interface else { continue };
+                    let missed = std::mem::take(&mut missed);
+                    self.writer.write_statistics(interface, until, written + missed, missed)?;
+                }
                 self.writer.finish()?;
                 Ok(self.file.check()?)
             }

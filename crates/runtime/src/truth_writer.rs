@@ -31,7 +31,8 @@ const KEPT: usize = 100_000;
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// Something that really happened in the segment.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TruthEvent {
     /// `linesman.truth/1`.
@@ -56,7 +57,8 @@ pub struct TruthEvent {
 }
 
 /// What a fault did.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EffectReport {
     /// What it was: `frame-lost`, `frame-spoiled`, `symbol-error`, `signal-lost`, …
@@ -69,13 +71,14 @@ pub struct EffectReport {
 
 impl From<Effect> for EffectReport {
     fn from(effect: Effect) -> Self {
-        let kind = <&str>::from(effect).to_owned();
+        let kind = effect.name().to_owned();
         Self { kind, frame: effect.frame(), text: format!("{effect:?}") }
     }
 }
 
 /// What kind of event it is.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum EventKind {
     /// A fault begins to act.

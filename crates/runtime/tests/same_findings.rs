@@ -27,6 +27,8 @@ const SEEDS: u64 = 200;
 /// Faults come after bring-up, and the line is looked at for some time behind them.
 const FAULT_AT_MS: f64 = 2_500.0;
 const LASTS: Span = Span::s(7);
+/// All is over before the end: a run goes on to be heard while it leaves the line.
+const LONGEST_MS: f64 = 1_500.0;
 
 /// A plant with a fault of this seed.
 fn plant(seed: u64) -> Option<(SegmentFile, Option<FaultName>, Span)> {
@@ -49,14 +51,17 @@ fn with_fault(case: &Case) -> Option<(SegmentFile, Option<FaultName>, Span)> {
     let offer =
         Offer { outline: &outline, file: &case.file, clocked: &[], reference: None, when: at };
     let drawn = draw(name, &offer, &mut case.seed.stream("same findings"))?;
-    let lasts_ms = drawn.choice.lasts.as_nanos() as f64 / 1e6;
+    let lasts_ms = (drawn.choice.lasts.as_nanos() as f64 / 1e6).min(LONGEST_MS);
     let entry = match at {
         When::FromStart => drawn.choice.entry,
         When::Running => {
             drawn.choice.entry.from_to(FAULT_AT_MS, Some(FAULT_AT_MS + lasts_ms.max(1.0)))
         }
     };
-    let file = SegmentFile { faults: vec![entry], ..case.file.clone() };
+    let mut file = SegmentFile { faults: vec![entry], ..case.file.clone() };
+    for link_up in file.devices.iter_mut().filter_map(|device| device.link_up_ms.as_mut()) {
+        *link_up = link_up.min(LONGEST_MS);
+    }
     Segment::build(&file).ok()?;
     Some((file, Some(name), case.cycle))
 }

@@ -30,6 +30,16 @@ impl FrameSummary {
     pub fn seen(self, bytes: &[u8]) -> FrameSeen<'_> {
         let Self { time, number, path, direction, truncated } = self;
         let network = Network::default();
-        FrameSeen { network, path, direction, time, number, fcs: None, truncated, bytes }
+        FrameSeen {
+            network,
+            path,
+            direction,
+            time,
+            number,
+            fcs: None,
+            truncated,
+            probe: None,
+            bytes,
+        }
     }
 }

@@ -42,9 +42,8 @@ pub enum Place {
 
 /// What a cause made happen.
 ///
-/// Each has a stable name for programs, `<&str>::from(effect)`: `frame-lost`.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, strum::IntoStaticStr)]
-#[strum(serialize_all = "kebab-case")]
+/// Each has a stable name for programs, [`Effect::name`]: `frame-lost`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Effect {
     /// A symbol was destroyed, in or outside of a frame: the receiver's physical-layer error.
     SymbolError,
@@ -158,6 +157,48 @@ pub enum Effect {
 }
 
 impl Effect {
+    /// Its stable name for programs.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::SymbolError => "symbol-error",
+            Self::FrameSpoiled { .. } => "frame-spoiled",
+            Self::FrameLost { .. } => "frame-lost",
+            Self::StrangerSent { .. } => "stranger-sent",
+            Self::ContentRefused { .. } => "content-refused",
+            Self::SignalLost => "signal-lost",
+            Self::SignalBack => "signal-back",
+            Self::PowerLost => "power-lost",
+            Self::PowerBack => "power-back",
+            Self::StateRefused { .. } => "state-refused",
+            Self::Misbehaves(_) => "misbehaves",
+            Self::ProcessorStopped => "processor-stopped",
+            Self::ProcessorRuns => "processor-runs",
+            Self::ProcessorRestarted => "processor-restarted",
+            Self::CardSilent => "card-silent",
+            Self::WatchdogSet { .. } => "watchdog-set",
+            Self::WatchdogExpired { .. } => "watchdog-expired",
+            Self::EmergencySent { .. } => "emergency-sent",
+            Self::ClockDrifts { .. } => "clock-drifts",
+            Self::ClockStopped => "clock-stopped",
+            Self::ClockRestarted => "clock-restarted",
+            Self::ClockRestored => "clock-restored",
+            Self::SyncCut => "sync-cut",
+            Self::SyncBounces => "sync-bounces",
+            Self::SyncBack => "sync-back",
+            Self::WorkTakes { .. } => "work-takes",
+            Self::WorkRestored => "work-restored",
+            Self::FrameHeldBack { .. } => "frame-held-back",
+            Self::OldCounters => "old-counters",
+            Self::WrongDevice => "wrong-device",
+            Self::MissingDevice => "missing-device",
+            Self::ExtraDevice => "extra-device",
+            Self::SwappedDevice => "swapped-device",
+            Self::SharedAddress { .. } => "shared-address",
+            Self::WrongPort => "wrong-port",
+        }
+    }
+
     /// The number of the frame it was about, if it was about one.
     #[must_use]
     pub const fn frame(&self) -> Option<u64> {

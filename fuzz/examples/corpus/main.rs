@@ -11,6 +11,7 @@ use linesman_link::capture::{
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::LogicalAddress;
 use linesman_proto::command::Command;
+use linesman_proto::esl::EslRecord;
 use linesman_proto::ethernet::{MAX_LEN, MacAddress};
 use linesman_proto::frame::FrameBuilder;
 use linesman_proto::frame::builder::DatagramAddress;
@@ -29,6 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frames = frames()?;
     let captures = captures(&frames)?;
     let targets = [
+        ("capture_filter", conditions()?),
         ("segment", series(&frames)),
         ("diagnosis", series(&frames)),
         ("segment_file", segment_files()),
@@ -81,6 +83,22 @@ fn frames() -> Result<Made, Box<dyn Error>> {
     cut.truncate(90);
     frames.push(("cut-off", cut));
     Ok(frames)
+}
+
+/// Conditions on frames, each with a frame behind it, with the record of a capture probe or without.
+fn conditions() -> Result<Made, Box<dyn Error>> {
+    let (frame, record) = (
+        frame(&[(Command::Fprd, 2), (Command::Lrw, 4)])?,
+        EslRecord { port: Some(0), crc_error: false, alignment_error: true, time_ns: 183_570 },
+    );
+    let record = record.to_bytes();
+    let with = |text: &str, parts: &[&[u8]]| [text.as_bytes(), b"\n", &parts.concat()].concat();
+    Ok(vec![
+        ("status", with("ecat.cmd == \"FPRD\" && ecat.ado in {0x0120..0x0140}", &[&frame])),
+        ("probe", with("esl.port == 0 and not (cyclic or ecat_mailbox)", &[&frame, &record])),
+        ("front", with("datagram(ecat.cnt & 1) ^^ around(F1, 5ms)", &[&record, &frame])),
+        ("fault", with("ecat.cmd = (4", &[])),
+    ])
 }
 
 fn frame(datagrams: &[(Command, usize)]) -> Result<Vec<u8>, Box<dyn Error>> {

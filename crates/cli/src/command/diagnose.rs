@@ -1,28 +1,33 @@
 //! `linesman diagnose`: what is wrong with a line, where, why, and what to do.
 
-mod capture;
+mod bundle;
+pub(crate) mod capture;
 mod cards;
 mod file;
 pub(crate) mod follow;
 mod listen;
 mod observations;
+mod probe_recording;
 mod questions;
+mod recordings;
+mod ring;
 mod segment;
 pub(crate) mod several;
 
 use std::path::{Path, PathBuf};
 
+use linesman_capture::CaptureReport;
 use linesman_diagnosis::ask::AskSetup;
+use linesman_diagnosis::report::second_look::{EarlierLook, RepairStep};
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_diagnosis::{Engine, Setup};
-use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
-use linesman_runtime::record::Recorder;
 use linesman_runtime::selector::Selector;
 
 use self::follow::Follower;
+use self::probe_recording::ProbeArguments;
 use crate::amount::{count, lasting};
 use crate::drawing;
 use crate::exit::Status;
@@ -35,6 +40,7 @@ use crate::text::finding::Writer;
 use crate::text::names::Names;
 use crate::version;
 
+use super::bundle::recording::{BundleArguments, BundleRecording};
 use super::line_access;
 
 /// The clock of an observation file.
@@ -48,7 +54,7 @@ pub(crate) const READINGS: &str = "readings";
     after_help = "What a file is, its bytes say, not its name: a capture (pcap, pcapng), or a text with \
                   what was read; either may be packed by gzip, xz or zstd. `-` is standard input, \
                   and a pipe is judged as it comes: `ssh HOST tcpdump -i eth0 -U -w - ether proto \
-                  0x88a4 | linesman diagnose -`.\n\nSeveral files are told in a line each. Exit \
+                  0x88a4 | linesman diagnose -`.\n\nFiles of one ring, told by their numbered names, are one recording. Other files are told in a line each. Exit \
                   status of several: 1 if anything is wrong in one of them, else 2 if one could not \
                   be judged, else 3 if one is inconclusive, else 0."
 )]
@@ -61,15 +67,25 @@ pub(crate) struct Arguments {
     /// working counters, too
     #[arg(long, value_name = "PROJECT.toml|ENI.xml")]
     project: Option<PathBuf>,
+    /// Judge the files of a ring (trace_00001_….pcapng, trace_00002_….pcapng) each for itself, not as one recording
+    #[arg(long)]
+    separate: bool,
     /// Tell findings as they open and close; with --json one linesman.event/1 per line
     #[arg(long)]
     follow: bool,
+    /// After something was exchanged on account of an earlier diagnosis (PREVIOUS.json, written with --json): say what became
+    /// of its finding, and weigh causes by it. STEP is exchanged-cable, exchanged-card, exchanged-device, or
+    /// exchanged-device:NUMBER for one end of a link
+    #[arg(long, num_args = 2, value_names = ["STEP", "PREVIOUS.json"])]
+    after: Option<Vec<String>>,
     /// How long to look (5, 500ms, 10m); Ctrl-C ends it too
     #[arg(long, visible_alias = "for", value_name = "SECONDS", value_parser = lasting())]
     seconds: Option<Span>,
     /// Write what is seen to a capture file, for Wireshark or to be judged again
     #[arg(long, value_name = "FILE.pcapng")]
     record: Option<PathBuf>,
+    #[command(flatten)]
+    bundles: BundleArguments,
     /// Also what writes: on a card station addresses and the reading of each SII; where frames vanish though
     /// every port shows a link, ports are closed for a second at most, one after the other. States and
     /// counters are left alone in any case
@@ -91,6 +107,8 @@ pub(crate) struct Arguments {
     /// On a virtual segment: the state that its SubDevices are driven to
     #[arg(long, value_enum, value_name = "STATE", ignore_case = true)]
     to: Option<Target>,
+    #[command(flatten)]
+    probe: ProbeArguments,
     /// Write the diagnosis as a page of its own: drawing, time line, evidence, what to do
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
@@ -143,34 +161,67 @@ impl From<Target> for AlState {
 
 /// Judges what the selector names.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let [place] = arguments.places.as_slice() else { return several::run(arguments, output) };
+    if !arguments.separate && ring::is_ring(&arguments.places) {
+        return ring::run(arguments, output);
+    }
+    let [place] = arguments.places.as_slice() else {
+        if arguments.after.is_some() {
+            return Err(Failure::new(
+                "--after: several files were given, and one of them is looked at again",
+                "give the one file or line that was recorded after the exchange",
+            ));
+        }
+        return several::run(arguments, output);
+    };
     let selector = Selector::resolve(place)?;
     refuse_misplaced(arguments, &selector)?;
     for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
     let project = arguments.project.as_deref().map(Planned::open).transpose()?;
+    let earlier = arguments.after.as_deref().map(earlier_look).transpose()?;
     match &selector {
         Selector::File(path) => {
             let stop = line_access::stop()?;
-            let mut session = DiagnosisRun::new(arguments, &selector, project);
+            let mut session = DiagnosisRun::new(arguments, &selector, project, earlier);
             let judged = file::judge(path, &stop, &mut session, output)?;
             Ok(session.answer(&judged.engine, &judged.names, judged.at, output))
         }
         Selector::Listen(names) => {
-            let session = DiagnosisRun::new(arguments, &selector, project);
+            let session = DiagnosisRun::new(arguments, &selector, project, earlier);
             listen::run(names, arguments.questions(), session, output)
         }
         Selector::Cards(names) => {
-            let session = DiagnosisRun::new(arguments, &selector, project);
+            let session = DiagnosisRun::new(arguments, &selector, project, earlier);
             cards::run(names, arguments.active, session, output)
         }
         Selector::Segment(path) => {
-            let session = DiagnosisRun::new(arguments, &selector, None);
+            let session = DiagnosisRun::new(arguments, &selector, None, earlier);
             let target = arguments.to.unwrap_or_default().into();
-            segment::run(path, target, arguments.active, session, output)
+            segment::run(path, target, arguments, session, output)
         }
     }
+}
+
+/// The earlier diagnosis, and what was done since.
+fn earlier_look(after: &[String]) -> Result<EarlierLook, Failure> {
+    let [step, path] = after else {
+        return Err(Failure::new(
+            "--after: expected a step and a file",
+            "see `linesman diagnose --help`",
+        ));
+    };
+    let step: RepairStep = step
+        .parse()
+        .map_err(|error| Failure::new(format!("--after {error}"), "name what was exchanged"))?;
+    let path = Path::new(path);
+    let text = files::text(path, "an earlier diagnosis")?;
+    let advice = "give a file that `linesman diagnose WHERE --json` has written";
+    let previous: Diagnosis =
+        serde_json::from_str(&text).map_err(|error| files::in_file_of(path, &error, advice))?;
+    EarlierLook::of(&previous, step).map_err(|why| {
+        Failure::new(format!("{}: {why}", path.display()), "name the part that was exchanged")
+    })
 }
 
 /// Refuses options that say nothing about such a selector: whoever wrote them expects something.
@@ -179,12 +230,18 @@ fn refuse_misplaced(arguments: &Arguments, selector: &Selector) -> Result<(), Fa
     let is_segment = matches!(selector, Selector::Segment(_));
     let is_driven = matches!(selector, Selector::Cards(_));
     let is_listened = matches!(selector, Selector::Listen(_));
-    let Arguments { project, seconds, record, active, to, ask, .. } = arguments;
+    let Arguments { project, seconds, record, active, to, ask, probe, .. } = arguments;
     let rows = [
         ("--record", record.is_some() && is_file, "there is nothing to record"),
+        ("--bundles", arguments.bundles.bundles.is_some() && is_file, "it is recorded already"),
         ("--seconds", seconds.is_some() && is_file, "the file is judged to its end"),
         ("--project", project.is_some() && is_segment, "the file says itself what was planned"),
         ("--active", *active && !is_driven && !is_segment, "nothing there can be written to"),
+        (
+            "--probe-at",
+            probe.is_wanted() && !is_segment,
+            "a probe is looped into virtual segments only",
+        ),
         ("--to", to.is_some() && !is_segment, "only a virtual segment is driven to a state"),
         ("--ask", *ask && is_driven, "what is to be known is read there anyway"),
         ("--ask", *ask && !is_listened, "nobody can be asked there"),
@@ -212,63 +269,56 @@ pub(crate) struct DiagnosisRun {
     follower: Option<Follower>,
     lasts: Option<Span>,
     record: Option<PathBuf>,
+    bundles: BundleArguments,
+    recording: Option<BundleRecording>,
     /// That it has failed was said.
     recording_failed: bool,
     html: Option<PathBuf>,
+    /// Network and dialogue of a capture, for the page.
+    surveyed: Option<CaptureReport>,
     svg: Option<PathBuf>,
     origin: page::Origin,
     devices: bool,
     json: bool,
     /// Of a pasted text: what was understood.
     understood: Option<Understood>,
+    /// Finding of an earlier diagnosis, and the repair since.
+    earlier: Option<EarlierLook>,
+    /// Of a bundle: that the same was found as when it was written.
+    agreement: Option<String>,
 }
 
 impl DiagnosisRun {
-    fn new(arguments: &Arguments, selector: &Selector, planned: Option<Planned>) -> Self {
+    fn new(
+        arguments: &Arguments,
+        selector: &Selector,
+        planned: Option<Planned>,
+        earlier: Option<EarlierLook>,
+    ) -> Self {
         let (project, exchange) =
             planned.map(|Planned { project, exchange }| (project, exchange)).unzip();
         let exchange = exchange.unwrap_or_default();
-        let setup = Setup { project, exchange, source: selector.to_string(), ..Setup::default() };
+        let exchanges = earlier.as_ref().and_then(EarlierLook::exchange).into_iter().collect();
+        let source = selector.to_string();
+        let setup = Setup { project, exchange, source, exchanges, ..Setup::default() };
         let follower = arguments.follow.then(|| Follower::new(arguments.json));
         Self {
             setup,
             follower,
             lasts: arguments.seconds,
             record: arguments.record.clone(),
+            bundles: arguments.bundles.clone(),
+            recording: None,
             recording_failed: false,
             html: arguments.html.clone(),
+            surveyed: None,
             svg: arguments.svg.clone(),
             origin: arguments.origin.clone(),
             devices: arguments.devices,
             json: arguments.json,
             understood: None,
-        }
-    }
-
-    /// Begins the recording, where that was asked for. `start` is the date of the run's time 0.
-    fn recorder(&self, start: UnixTime, names: &[String]) -> Result<Option<Recorder>, Failure> {
-        let Some(path) = &self.record else { return Ok(None) };
-        files::refuse_to_overwrite(path)?;
-        let recorder = Recorder::create(path, &version::tool(), start, names);
-        recorder.map(Some).map_err(|error| files::in_file(path, &error))
-    }
-
-    /// Says at once that the recording has come to an end before the line was judged.
-    fn look_at_recording(&mut self, recorder: Option<&Recorder>, output: &Output) {
-        let fault = recorder.and_then(Recorder::fault);
-        if let (Some(fault), Some(path), false) = (fault, &self.record, self.recording_failed) {
-            self.recording_failed = true;
-            output.fail(&unrecorded(path, fault));
-        }
-    }
-
-    /// Ends the recording.
-    fn end_recording(&self, recorder: Option<Recorder>, output: &Output) {
-        let (Some(recorder), Some(path)) = (recorder, &self.record) else { return };
-        if let Err(error) = recorder.finish()
-            && !self.recording_failed
-        {
-            output.fail(&unrecorded(path, &error));
+            earlier,
+            agreement: None,
         }
     }
 
@@ -279,9 +329,16 @@ impl DiagnosisRun {
 
     /// Tells what happened to findings, where that was asked for.
     fn follow(&mut self, engine: &mut Engine, output: &mut Output) {
-        let Some(follower) = &mut self.follower else { return };
+        if self.follower.is_none() && self.recording.is_none() {
+            return;
+        }
         while let Some(event) = engine.poll_event() {
-            follower.tell(event, &names(engine), output);
+            if let Some(recording) = &mut self.recording {
+                recording.event(&event);
+            }
+            if let Some(follower) = &mut self.follower {
+                follower.tell(event, &names(engine), output);
+            }
         }
     }
 
@@ -307,6 +364,12 @@ impl DiagnosisRun {
     /// Ends the input.
     fn end(&mut self, engine: &mut Engine, at: Instant, complete: bool, output: &mut Output) {
         engine.finish(at, complete);
+        self.tell_rest(engine, output);
+        self.end_bundles(at, engine, output);
+    }
+
+    /// Tells what is left to tell of an input that has ended.
+    fn tell_rest(&mut self, engine: &mut Engine, output: &mut Output) {
         self.follow(engine, output);
         self.flush(&names(engine), output);
     }
@@ -323,7 +386,9 @@ impl DiagnosisRun {
 
     /// Gives the answer.
     fn answer(&self, engine: &Engine, names: &Names, at: Instant, output: &mut Output) -> Status {
-        let diagnosis = self.diagnosis(engine);
+        let mut diagnosis = self.diagnosis(engine);
+        diagnosis.second_look =
+            self.earlier.as_ref().map(|earlier| earlier.compare(&diagnosis, at.as_nanos()));
         match (&self.follower, self.json) {
             (Some(follower), true) => follower.end(at, &diagnosis, output),
             (None, true) => output.json(&diagnosis),
@@ -332,6 +397,9 @@ impl DiagnosisRun {
                 if self.devices || text::devices::is_wanted(&diagnosis) {
                     let table = text::devices::write(&diagnosis, output.paint());
                     output.text(&format!("\n{table}"));
+                }
+                if let Some(agreement) = &self.agreement {
+                    output.line(agreement);
                 }
             }
         }
@@ -360,7 +428,8 @@ impl DiagnosisRun {
                 timed,
                 place: &diagnosis.source,
             };
-            let page = page::page(diagnosis, line, &writer, at, &self.origin);
+            let page =
+                page::page(diagnosis, line, self.surveyed.as_ref(), &writer, at, &self.origin);
             files::write_new(path, "the report", &page)?;
         }
         if let Some(path) = &self.svg {
@@ -373,12 +442,6 @@ impl DiagnosisRun {
         }
         Ok(())
     }
-}
-
-/// Why a recording is not whole.
-fn unrecorded(path: &Path, error: &dyn std::error::Error) -> Failure {
-    let reason = format!("{}: recording the line: {error}", path.display());
-    Failure::new(reason, "make room there, leave the file where it is, and record anew")
 }
 
 /// The diagnosis as text.
@@ -396,7 +459,7 @@ pub(super) fn print(diagnosis: &Diagnosis, names: &Names, output: &mut Output) {
 }
 
 /// What the SubDevices are called: by the project, else by their types.
-fn names(engine: &Engine) -> Names {
+pub(crate) fn names(engine: &Engine) -> Names {
     let devices = engine.model(Network(0)).map(|line| line.devices.as_slice()).unwrap_or_default();
     let known = |text: &Option<String>| text.clone().unwrap_or_default();
     Names::new(devices.iter().map(|device| (known(&device.name), known(&device.type_name))))

@@ -1,15 +1,18 @@
 //! `linesman lab`: stories, swarms, scores and recordings in virtual time.
 
-pub(crate) mod excerpts;
+pub(crate) mod capture_probe;
+mod excerpts;
 mod listener_captures;
 mod listener_tables;
+mod merge;
 pub(crate) mod replay;
 pub(crate) mod score;
+mod score_tables;
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc;
 use std::thread;
@@ -18,7 +21,9 @@ use linesman_lab::habit::Habit;
 use linesman_lab::story::Story;
 use linesman_lab::story::run::play;
 use linesman_lab::swarm::physics::{PhysicsReport, run_physics_seed};
-use linesman_lab::swarm::run::{SeedReport, SwarmOptions, SwarmReport, run_seed};
+use linesman_lab::swarm::run::{
+    PART_SCHEMA, SeedSum, SwarmOptions, SwarmPart, SwarmReport, run_seed,
+};
 
 use crate::amount::number_of_things;
 use crate::exit::Status;
@@ -26,6 +31,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::output::{Output, Progress};
 use crate::text::quantity::count;
+use crate::version;
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -49,8 +55,12 @@ enum Command {
     Replay(replay::Arguments),
     /// Measure how often the diagnosis is right, on plants and faults drawn by chance
     Score(score::Arguments),
+    /// Add up parts of a score or of a swarm that several processes or machines have played
+    Merge(merge::Arguments),
     /// Cut recordings at random, and hold the verdicts on them against the truth
     Excerpts(excerpts::Arguments),
+    /// Loop a capture probe into plants drawn by chance, and hold what its recording is said to show against the truth
+    CaptureProbe(capture_probe::Arguments),
     /// Run plants and faults drawn by chance, and check what must always hold
     Swarm {
         /// From the first seed up to, not including, the second
@@ -67,6 +77,9 @@ enum Command {
         /// Only what did not hold, and the sum
         #[arg(long, short)]
         quiet: bool,
+        /// Write the seeds to a new file, too, for `lab merge`
+        #[arg(long, value_name = "FILE.json", conflicts_with = "physics")]
+        part: Option<PathBuf>,
     },
 }
 
@@ -76,7 +89,9 @@ impl Arguments {
         match &self.command {
             Command::Replay(arguments) => arguments.json,
             Command::Score(arguments) => arguments.json,
-            Command::Run { .. } | Command::Swarm { .. } | Command::Excerpts(_) => false,
+            Command::Merge(arguments) => arguments.json,
+            Command::Run { .. } | Command::Swarm { .. } => false,
+            Command::Excerpts(_) | Command::CaptureProbe(_) => false,
         }
     }
 }
@@ -87,12 +102,14 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Command::Run { habit, stories } => run_stories(stories, *habit, output),
         Command::Replay(arguments) => replay::run(arguments, output),
         Command::Score(arguments) => score::run(arguments, output),
+        Command::Merge(arguments) => merge::run(arguments, output),
         Command::Excerpts(arguments) => excerpts::run(arguments, output),
+        Command::CaptureProbe(arguments) => capture_probe::run(arguments, output),
         Command::Swarm { seeds, physics: true, quiet, .. } => {
             Ok(run_physics(seeds.clone(), *quiet, output))
         }
-        Command::Swarm { seeds, quiet, habit, .. } => {
-            Ok(run_swarm(seeds.clone(), *habit, *quiet, output))
+        Command::Swarm { seeds, quiet, habit, part, .. } => {
+            run_swarm(seeds.clone(), *habit, *quiet, part.as_deref(), output)
         }
     }
 }
@@ -134,22 +151,40 @@ fn run_stories(
     Ok(if held == stories.len() { Status::Good } else { Status::Findings })
 }
 
-fn run_swarm(seeds: Range<u64>, habit: Habit, quiet: bool, output: &mut Output) -> Status {
-    let total = seeds.end - seeds.start;
+fn run_swarm(
+    seeds: Range<u64>,
+    habit: Habit,
+    quiet: bool,
+    part: Option<&Path>,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    if let Some(path) = part {
+        files::refuse_to_overwrite(path)?;
+    }
+    let (from, to) = (seeds.start, seeds.end);
     let mut progress = Progress::new();
     let mut done = 0;
-    let mut shown = String::new();
     let report = swarm(seeds, habit, |seed| {
         done += 1;
-        if !quiet || !seed.is_green() {
+        if !quiet || !seed.is_green {
             progress.clear();
-            output.line(&seed.to_string());
+            output.line(&seed.words);
         }
-        shown = format!("{done} of {}", count(total, "seed"));
-        progress.show(|| shown.clone());
+        progress.show(|| format!("{done} of {}", count(to - from, "seed")));
     });
     progress.clear();
     output.line(&sum(&report));
+    let status = status_of(&report);
+    if let Some(path) = part {
+        let (schema, tool) = (PART_SCHEMA.to_owned(), version::tool());
+        let part =
+            SwarmPart { schema, tool, seeds: (from, to), options: habit, cases: report.seeds };
+        files::write_new(path, "the part of the swarm", &merge::text_of(path, &part)?)?;
+    }
+    Ok(status)
+}
+
+fn status_of(report: &SwarmReport) -> Status {
     if report.is_green() { Status::Good } else { Status::Findings }
 }
 
@@ -180,12 +215,12 @@ fn run_physics(seeds: Range<u64>, quiet: bool, output: &mut Output) -> Status {
 }
 
 /// Runs the seeds and gives their reports in order.
-fn swarm(seeds: Range<u64>, habit: Habit, mut show: impl FnMut(&SeedReport)) -> SwarmReport {
+fn swarm(seeds: Range<u64>, habit: Habit, mut show: impl FnMut(&SeedSum)) -> SwarmReport {
     let options = SwarmOptions { habit, ..SwarmOptions::default() };
     let mut report = SwarmReport::default();
     on_all_processors(
         seeds,
-        |seed| run_seed(seed, &options),
+        |seed| SeedSum::from(&run_seed(seed, &options)),
         |of_seed| {
             show(&of_seed);
             report.seeds.push(of_seed);

@@ -1,5 +1,7 @@
 //! The commands, one file each.
 
+pub(crate) mod bundle;
+pub(crate) mod capture;
 pub(crate) mod completion;
 pub(crate) mod counters;
 pub(crate) mod demo;
@@ -43,6 +45,8 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Plan(arguments) => plan::run(&arguments, output),
         Command::Scan(arguments) => scan::run(&arguments, output),
         Command::Diagnose(arguments) => diagnose::run(&arguments, output),
+        Command::Capture(arguments) => capture::run(&arguments, output),
+        Command::Bundle(arguments) => bundle::run(&arguments, output),
         Command::Host(arguments) => host::run(&arguments, output),
         Command::Interfaces(arguments) => interfaces::run(&arguments, output),
         Command::Explain(arguments) => explain::run(&arguments, output),

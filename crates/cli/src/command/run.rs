@@ -10,16 +10,19 @@ use linesman_config::eni::Eni;
 use linesman_config::plan::{Plan, PlannedExchange};
 use linesman_config::project::Project;
 use linesman_diagnosis::report::Verdict;
-use linesman_diagnosis::{InputKind, Setup};
+use linesman_diagnosis::{Engine, InputKind, Setup};
 use linesman_link::clock::HostClock;
 use linesman_link::error::LinkError;
 use linesman_link::socket::WakeHandle;
+use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
+use linesman_runtime::bundle::{BundleReceiver, BundleRecorder, RecordedEngine};
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::online::OnlineState;
 use linesman_runtime::plan_file::PlanFile;
+use linesman_runtime::run::diagnosis_thread::DiagnosisObserver;
 use linesman_runtime::run::{
     self as running, Idle, NOTES, PlanChoices, PlanSource, RealTime, RunControls, RunOutcome,
     SessionOptions, Shared,
@@ -31,6 +34,7 @@ use linesman_runtime::system_log::SystemLog;
 use linesman_runtime::transport::{Cards, Pace, Transport};
 
 use self::reporter::{Logs, RunReporter};
+use super::bundle::recording::{self, BundleArguments};
 use super::line_access;
 use crate::amount::{MICROSECOND, count as count_of, cycle, duration, lasting};
 use crate::exit::Status;
@@ -113,8 +117,10 @@ pub(crate) struct Arguments {
     /// Open a socket for service commands beside the run; it is there once the line is being driven
     #[arg(long, value_name = "SOCKET")]
     control: Option<PathBuf>,
+    #[command(flatten)]
+    bundles: BundleArguments,
     /// Do not judge the line meanwhile
-    #[arg(long)]
+    #[arg(long, conflicts_with = "bundles")]
     no_diagnosis: bool,
     /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there
     #[arg(long, value_name = "FILE")]
@@ -152,7 +158,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         (Source::Project(project), Some(path)) => {
             format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
         }
-        (Source::Planned(plan), Some(path)) => {
+        (Source::Planned(plan, _), Some(path)) => {
             format!("{} of {}", count(plan.devices.len() as u64, "SubDevice"), path.display())
         }
         _ => "what is there".to_owned(),
@@ -161,10 +167,11 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         input: InputKind::Driven,
         project: match &source {
             Source::Project(project) => Some((**project).clone()),
-            Source::AsFound | Source::Planned(_) => None,
+            Source::Planned(_, project) => project.as_deref().cloned(),
+            Source::AsFound => None,
         },
         exchange: match &source {
-            Source::Planned(plan) => plan.exchange(),
+            Source::Planned(plan, _) => plan.exchange(),
             Source::AsFound | Source::Project(_) => PlannedExchange::default(),
         },
         source: arguments.on.clone(),
@@ -186,7 +193,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     };
     let wanted = match source {
         Source::Project(project) => choices.project(*project),
-        Source::Planned(mut plan) => {
+        Source::Planned(mut plan, _) => {
             for device in &mut plan.devices {
                 device.target = device.target.min(arguments.to);
             }
@@ -234,7 +241,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
                 lock_memory: arguments.priority > 0,
             });
             let options = with_source(options, real_time, began.rfc3339());
-            drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
+            let bundles = arguments.bundles.start(began, names)?;
+            let beside = (socket, bundles);
+            drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
         }
         Selector::Segment(path) => {
             // Without an end it goes no faster than the host's clock, for a person to look on.
@@ -246,7 +255,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             if let Some(setup) = &mut options.diagnose {
                 setup.clock = "virtual".to_owned();
             }
-            drive(line, wanted, &options, application, socket, &stop, &said, reporter, output)
+            // A virtual run has no date.
+            let bundles = arguments.bundles.start(UnixTime::EPOCH, &[])?;
+            let beside = (socket, bundles);
+            drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
         }
         Selector::Listen(_) | Selector::File(_) => {
             Err(line_access::not_drivable(&arguments.on, &selector))
@@ -258,7 +270,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 enum Source {
     AsFound,
     Project(Box<Project>),
-    Planned(Box<Plan>),
+    /// A plan, and the project that it was made of, unless that was an ENI.
+    Planned(Box<Plan>, Option<Box<Project>>),
 }
 
 impl Source {
@@ -270,10 +283,10 @@ impl Source {
             }
         }
         // What chooses more than who is where is planned from what it says.
-        let PlanFile { plan, notes, .. } = PlanFile::open_with(path, cycle)?;
+        let PlanFile { plan, project, notes, .. } = PlanFile::open_with(path, cycle)?;
         // What is left out of it is not found out only when it is missed.
         notes.iter().for_each(|note| output.warn(note));
-        Ok(Self::Planned(Box::new(plan)))
+        Ok(Self::Planned(Box::new(plan), project.map(Box::new)))
     }
 }
 
@@ -312,6 +325,15 @@ fn with_source(
     options
 }
 
+/// The diagnosis of the run, with a recorder of bundles beside it where one is wanted.
+fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn DiagnosisObserver> {
+    let engine = Engine::new(setup);
+    match recorder {
+        Some(recorder) => Box::new(RecordedEngine::new(engine, recorder)),
+        None => Box::new(engine),
+    }
+}
+
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
 fn drive<L: Transport<Error = LinkError> + Send>(
@@ -319,7 +341,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     wanted: PlanSource,
     options: &SessionOptions,
     image: Option<PathBuf>,
-    socket: Option<ServiceSocket>,
+    (socket, bundles): (Option<ServiceSocket>, Option<(BundleRecorder, BundleReceiver)>),
     stop: &Stop,
     said: &str,
     mut reporter: RunReporter,
@@ -328,17 +350,24 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     reporter.line(said, output);
     let (notes, told) = mpsc::sync_channel(NOTES);
     let socket_watch = socket.as_ref().map(ServiceSocket::watch);
-    let look = |reporter: &mut RunReporter, output: &Output| {
+    let (recorder, news) = bundles.unzip();
+    let look = |reporter: &mut RunReporter, output: &mut Output| {
         reporter.look_at_logs(output);
+        if let Some(news) = &news {
+            recording::tell(news, !reporter.is_json(), output);
+        }
         if let Some(why) = socket_watch.as_ref().and_then(ControlSocketWatch::trouble) {
             reporter.complain(&why, output);
         }
     };
     let ended = std::thread::scope(|scope| {
         let beside = RunControls { stop, notes, socket };
+        let judge = move |setup| observer(setup, recorder);
         let work = move || match image {
-            None => running::run(line, wanted, Idle, options, beside),
-            Some(path) => running::run(line, wanted, Shared::at(path), options, beside),
+            None => running::run_observed(line, wanted, Idle, options, beside, judge),
+            Some(path) => {
+                running::run_observed(line, wanted, Shared::at(path), options, beside, judge)
+            }
         };
         let thread = scope.spawn(work);
         let mut looked = std::time::Instant::now();
@@ -364,6 +393,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
         reporter.flush(output);
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     });
+    look(&mut reporter, output);
     let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
     if let Some((lost, why)) = reporter.lost() {
         reporter
@@ -374,7 +404,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     {
         let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
         reporter.complain(&why, output);
-        let lost = format!("{} missing in the event log", count(log.dropped, "entry"));
+        let lost = format!("{} missing in the event log", count(log.dropped, "event"));
         reporter.complain(&lost, output);
     }
     let RunOutcome { mut report, error, failed } =

@@ -1,9 +1,13 @@
 //! `linesman schema`: the JSON schema of each file and output.
 
+use linesman_capture::CaptureReport;
+use linesman_capture::comparison::ComparisonReport;
+use linesman_capture::timing::timeline::TimelineReport;
 use linesman_config::project::Project;
 use linesman_diagnosis::observation_file::ObservationFile;
 use linesman_diagnosis::report::Diagnosis;
 use linesman_lab::score::ScoreReport;
+use linesman_runtime::bundle::{Manifest, ObservationLine};
 use linesman_runtime::control::message::{Faults, Request, SignalTable};
 use linesman_runtime::online::report::OnlineReport;
 use linesman_runtime::run::report::RunReport;
@@ -20,7 +24,7 @@ use super::log::LogReport;
 use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
-use super::{counters, explain, foe, history, host, probe, reg, service, sii, state};
+use super::{capture, counters, explain, foe, history, host, probe, reg, service, sii, state};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -48,10 +52,24 @@ pub(crate) enum Name {
     Scan,
     /// `diagnose --json`
     Diagnosis,
+    /// `capture info --json`
+    Capture,
+    /// `capture timeline --json`
+    CaptureTimeline,
+    /// `capture compare --json`
+    CaptureComparison,
+    /// `manifest.json` of a bundle, and `bundle info --json`
+    Bundle,
+    /// A line of `observations.jsonl` of a bundle
+    BundleObservation,
     /// `diagnose --json` of several files
     Diagnoses,
     /// A line of `diagnose --follow --json`
     Event,
+    /// A line of `capture list --json`
+    CaptureRow,
+    /// `capture filter --json`
+    CaptureFilter,
     /// `lab replay --json`
     Replay,
     /// `lab score --json`
@@ -120,8 +138,15 @@ fn schema(name: Name) -> Schema {
         Name::Plan => schema_for!(PlanReport),
         Name::Scan => schema_for!(Scan),
         Name::Diagnosis => schema_for!(Diagnosis),
+        Name::Capture => schema_for!(CaptureReport),
+        Name::CaptureTimeline => schema_for!(TimelineReport),
+        Name::CaptureComparison => schema_for!(ComparisonReport),
+        Name::Bundle => schema_for!(Manifest),
+        Name::BundleObservation => schema_for!(ObservationLine),
         Name::Diagnoses => schema_for!(Diagnoses),
         Name::Event => schema_for!(EventReport<'_>),
+        Name::CaptureRow => schema_for!(capture::list::RowReport),
+        Name::CaptureFilter => schema_for!(capture::filter::FilterReport),
         Name::Replay => schema_for!(ReplayReport),
         Name::Score => schema_for!(ScoreReport),
         Name::Faults => schema_for!(Faults),

@@ -9,6 +9,7 @@ mod badge;
 mod layout;
 mod scene;
 mod svg;
+pub(crate) mod time_axis;
 mod wire;
 
 pub(crate) use scene::{Label, Mark, Scene, State};

@@ -1,17 +1,19 @@
 //! The report: a diagnosis as one self-contained page, to be mailed, printed and taken to the cabinet.
 //!
 //! No script, no file beside it, nothing fetched. [`findings`] says what is wrong and what to do,
-//! [`timeline`] when, the [`drawing`](crate::drawing) where; [`devices`] lists what every SubDevice
+//! [`timeline`] and [`events`] when, the [`drawing`](crate::drawing) where; [`devices`] lists what every SubDevice
 //! showed.
 
 mod coverage;
 mod devices;
+mod events;
 mod findings;
 mod prose;
 pub(crate) mod scene;
 mod timeline;
 mod wall_clock;
 
+use linesman_capture::CaptureReport;
 use linesman_diagnosis::model::NetworkModel;
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_proto::time::Instant;
@@ -19,7 +21,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::prose::prose;
 use self::wall_clock::WallClock;
-use crate::drawing;
+use crate::drawing::{self, time_axis};
 use crate::text::diagnosis::{NOT_COMPLETE, numbers, source_name, told, word};
 use crate::text::finding::Writer;
 use crate::text::quantity::{count, date};
@@ -38,10 +40,11 @@ pub(crate) struct Origin {
     author: Option<String>,
 }
 
-/// The whole page. `at` is the end of the run.
+/// The whole page. `at` is the end of the run; `capture` is what a recording shows by time.
 pub(crate) fn page(
     diagnosis: &Diagnosis,
     line: Option<&NetworkModel>,
+    capture: Option<&CaptureReport>,
     writer: &Writer<'_>,
     at: Instant,
     origin: &Origin,
@@ -59,7 +62,7 @@ pub(crate) fn page(
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="generator" content=(diagnosis.tool);
                 title { (title) }
-                style { (PreEscaped(STYLE)) (PreEscaped(drawing::STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(drawing::STYLE)) (PreEscaped(time_axis::STYLE)) }
             }
             body {
                 (head(diagnosis, origin, writer))
@@ -93,6 +96,9 @@ pub(crate) fn page(
                         }
                     }
                     @if writer.timed { (timeline::section(&diagnosis.findings, at, clock, writer)) }
+                    @if let Some(capture) = capture {
+                        (events::section(capture, diagnosis, clock, writer.names))
+                    }
                     (findings::section(&diagnosis.findings, clock, writer))
                     (devices::section(&diagnosis.devices, line))
                 }

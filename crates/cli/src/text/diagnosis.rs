@@ -1,6 +1,7 @@
 //! A whole diagnosis: the verdict, what was looked at, the findings, the network in numbers.
 
-use linesman_diagnosis::report::{Diagnosis, Verdict};
+use linesman_diagnosis::report::second_look::{PartReport, SecondLook, SecondLookOutcome};
+use linesman_diagnosis::report::{Diagnosis, Number, Verdict};
 
 use super::finding::{Writer, tally};
 use super::quantity::{count, date, grouped};
@@ -18,6 +19,10 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     text.push_str(&verdict(diagnosis, writer));
     text.push_str(&network(diagnosis, writer));
     text.push_str(&coverage::write(diagnosis, writer));
+    if let Some(look) = &diagnosis.second_look {
+        text.push('\n');
+        text.push_str(&wrapped("Second look  ", &second_look(look, writer), writer.width));
+    }
     for finding in &diagnosis.findings {
         text.push('\n');
         text.push_str(&writer.finding(finding));
@@ -37,6 +42,33 @@ pub(crate) fn write(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
 /// What makes numbers into names.
 const NAMED: &str = "`--project machine.toml`, as `linesman scan WHERE --save machine.toml` writes it, gives the \
                      SubDevices names.\n";
+
+/// Outcome of an earlier finding in words.
+fn second_look(look: &SecondLook, writer: &Writer<'_>) -> String {
+    let part = match look.part {
+        PartReport::Cable => "the cable",
+        PartReport::Device => "the SubDevice",
+        PartReport::Card => "the network card",
+    };
+    let seconds = |ns: Number| ns.0 as f64 / 1e9;
+    let (looked, shown) = (seconds(look.looked_ns), seconds(look.shown_after_ns));
+    let place = writer.names.place(&look.place);
+    let then = match look.outcome {
+        SecondLookOutcome::Stayed => {
+            format!("is there again: {part} that was exchanged is not it.")
+        }
+        SecondLookOutcome::Gone => format!(
+            "did not come again in {looked:.1} s, and had shown after {shown:.1} s before: most likely it was {part}, or its \
+             plugs."
+        ),
+        SecondLookOutcome::NotYet => format!(
+            "did not come again in {looked:.1} s, which is too short, or too little was judged, to say that it \
+             is gone: it had shown after {shown:.1} s before; look for {:.0} s or longer.",
+            seconds(look.long_enough_ns).ceil()
+        ),
+    };
+    format!("{} {} at {place} {then}", look.finding, look.code)
+}
 
 fn verdict(diagnosis: &Diagnosis, writer: &Writer<'_>) -> String {
     let (paint, word) = (writer.paint, word(diagnosis.verdict));

@@ -11,6 +11,8 @@ use super::quantity::{grouped, time};
 use crate::hint;
 use crate::output::{Paint, wrapped};
 
+/// Most other causes and places that are shown; JSON has them all.
+const MOST_OTHERS: usize = 12;
 /// Most pieces of evidence that are shown; JSON has them all.
 const MOST_EVIDENCE: usize = 6;
 /// Most consequences that are shown one by one.
@@ -40,11 +42,14 @@ impl Writer<'_> {
         let mut text = self.headline(finding);
         self.add(&mut text, "where", &self.names.place(&finding.place));
         self.add(&mut text, "cause", &cause(finding));
-        for other in others(finding) {
+        for other in others(finding).take(MOST_OTHERS) {
             self.add(&mut text, "or", &self.alternative(other));
             if let Some(by) = &other.told_apart_by {
                 self.add(&mut text, "", &format!("told apart by: {by}"));
             }
+        }
+        if let Some(more) = others_left_out(finding) {
+            self.add(&mut text, "", &format!("or one of {more} more (--json has them all)"));
         }
         if self.timed {
             self.add(&mut text, "when", &when(finding));
@@ -194,6 +199,15 @@ fn cause(finding: &FindingReport) -> String {
 /// What else it may be, as far as that is worth a person's time: below half a percent it is not.
 pub(crate) fn others(finding: &FindingReport) -> impl Iterator<Item = &AlternativeReport> {
     finding.alternatives.iter().filter(|other| other.confidence >= 0.005)
+}
+
+/// Number of other causes and places that are not shown, where that is worth a word: there are many, or each of them is
+/// as likely as the first.
+fn others_left_out(finding: &FindingReport) -> Option<usize> {
+    let shown = others(finding).take(MOST_OTHERS).count();
+    let is_open = finding.confidence < 0.5;
+    let is_told = others(finding).count() > shown || shown == 0 && is_open;
+    finding.alternatives.len().checked_sub(shown).filter(|more| is_told && *more > 0)
 }
 
 /// A severity in plain text.

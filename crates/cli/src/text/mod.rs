@@ -1,5 +1,6 @@
 //! Answers as people read them: what the JSON says, in words and by names.
 
+pub(crate) mod capture;
 pub(crate) mod coverage;
 pub(crate) mod devices;
 pub(crate) mod diagnosis;

@@ -50,6 +50,15 @@ impl Names {
         format!("{} {kind} {}", self.device(end.no), end.port)
     }
 
+    /// Place of an event in words; empty where that is not known. `no` is the number of a SubDevice.
+    pub(crate) fn place_of(&self, place: Option<&PlaceReport>, no: Option<u32>) -> String {
+        match (place, no) {
+            (Some(place), _) => self.place(place),
+            (None, Some(no)) => self.device(no),
+            (None, None) => String::new(),
+        }
+    }
+
     /// A place in words.
     pub(crate) fn place(&self, place: &PlaceReport) -> String {
         match place {

@@ -23,7 +23,7 @@ const SHIFT: usize = 12;
 
 /// How a planned node and a found one are taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Choice {
+enum NodeMatch {
     /// As the same; the children of these planned ports hang on these ports of the found one.
     Same([Port; 4]),
     /// The planned one is missing, and what hangs on this port of it has moved up.
@@ -37,7 +37,7 @@ enum Choice {
 struct Overlay<'a> {
     planned: Side<'a, Wanted>,
     found: Side<'a, There>,
-    known: BTreeMap<(usize, usize), (u32, Choice)>,
+    known: BTreeMap<(usize, usize), (u32, NodeMatch)>,
 }
 
 /// Lays what was found upon what was planned.
@@ -90,7 +90,7 @@ impl Overlay<'_> {
         }
     }
 
-    fn cost(&mut self, wanted: usize, there: usize) -> (u32, Choice) {
+    fn cost(&mut self, wanted: usize, there: usize) -> (u32, NodeMatch) {
         if let Some(known) = self.known.get(&(wanted, there)) {
             return *known;
         }
@@ -99,7 +99,7 @@ impl Overlay<'_> {
         // What hangs on the MainDevice itself is what the line begins with, whatever follows.
         let is_first = self.planned.tree.parent(wanted).is_none();
         if apart < best.0 && !is_first {
-            best = (apart, Choice::Apart);
+            best = (apart, NodeMatch::Apart);
         }
         // As long as nothing is wrong but names, nothing better is to be found.
         if best.0 >= ALONE && self.may_shift(wanted, there) {
@@ -109,7 +109,7 @@ impl Overlay<'_> {
                     if ALONE + rest < best.0 {
                         let cost = ALONE + rest + self.cost(child, there).0;
                         if cost < best.0 {
-                            best = (cost, Choice::Skip(port));
+                            best = (cost, NodeMatch::Skip(port));
                         }
                     }
                 }
@@ -118,7 +118,7 @@ impl Overlay<'_> {
                     if ALONE + rest < best.0 {
                         let cost = ALONE + rest + self.cost(wanted, child).0;
                         if cost < best.0 {
-                            best = (cost, Choice::Insert(port));
+                            best = (cost, NodeMatch::Insert(port));
                         }
                     }
                 }
@@ -141,7 +141,7 @@ impl Overlay<'_> {
     }
 
     /// The cost when both are the same device, with the best way to pair what hangs on them.
-    fn same(&mut self, wanted: usize, there: usize) -> (u32, Choice) {
+    fn same(&mut self, wanted: usize, there: usize) -> (u32, NodeMatch) {
         let own = match self.unlike(wanted, there) {
             None => 0,
             Some(what) if is_other_kind(what) => OTHER_KIND,
@@ -155,14 +155,14 @@ impl Overlay<'_> {
             straight.swap(entry.index(), found_entry.index());
             turned = REPLUGGED;
         }
-        let mut best = (self.pairing(wanted, there, straight), Choice::Same(straight));
+        let mut best = (self.pairing(wanted, there, straight), NodeMatch::Same(straight));
         if best.0 >= REPLUGGED {
             for (one, other) in [(1, 2), (1, 3), (2, 3), (0, 1), (0, 2), (0, 3)] {
                 let mut ports = straight;
                 ports.swap(one, other);
                 let cost = REPLUGGED + self.pairing(wanted, there, ports);
                 if cost < best.0 {
-                    best = (cost, Choice::Same(ports));
+                    best = (cost, NodeMatch::Same(ports));
                 }
             }
         }
@@ -188,19 +188,19 @@ impl Overlay<'_> {
                 (Some(wanted), None) => self.missing(wanted, None, into),
                 (None, Some(there)) => self.extra(there, None, into),
                 (Some(wanted), Some(there)) => match self.cost(wanted, there).1 {
-                    Choice::Apart => {
+                    NodeMatch::Apart => {
                         self.missing(wanted, None, into);
                         self.extra(there, None, into);
                     }
-                    Choice::Skip(port) => {
+                    NodeMatch::Skip(port) => {
                         self.missing(wanted, Some(port), into);
                         open.push((self.planned.tree.child(wanted, port), Some(there)));
                     }
-                    Choice::Insert(port) => {
+                    NodeMatch::Insert(port) => {
                         self.extra(there, Some(port), into);
                         open.push((Some(wanted), self.found.tree.child(there, port)));
                     }
-                    Choice::Same(ports) => {
+                    NodeMatch::Same(ports) => {
                         self.pair(wanted, there, ports, into);
                         for (port, at) in Port::ALL.into_iter().zip(ports) {
                             open.push((

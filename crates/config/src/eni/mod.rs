@@ -48,7 +48,7 @@ pub struct Eni {
 
 /// The file as it is being read.
 #[derive(Default)]
-struct File {
+struct EniFile {
     name: String,
     devices: Vec<FileDevice>,
     tasks: Vec<FileTask>,
@@ -84,7 +84,7 @@ impl Eni {
         if is_encrypted(&text) {
             return Err(EniError::Encrypted);
         }
-        let mut file = File { cycle, ..File::default() };
+        let mut file = EniFile { cycle, ..EniFile::default() };
         let mut root = None;
         let containers = |path: &[String]| match path {
             [root] => root == ROOT,
@@ -121,7 +121,7 @@ fn is_encrypted(text: &str) -> bool {
         .any(|mark| head.contains(mark))
 }
 
-impl File {
+impl EniFile {
     fn take(&mut self, element: Element) -> Result<(), crate::esi::EsiError> {
         match element.name.as_str() {
             "Master" => {

@@ -14,12 +14,12 @@ const SIMILAR: f64 = 0.8;
 /// Which device of a file is meant: `EL3004`, `EL3004@0x00160000`, `0x0BBC3052@22`.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Selection {
-    what: What,
+    what: SearchTerm,
     revision: Option<u32>,
 }
 
 #[derive(Clone, PartialEq, Eq, Debug)]
-enum What {
+enum SearchTerm {
     /// The only device of the file.
     Any,
     Type(String),
@@ -86,18 +86,18 @@ impl Selection {
         };
         let product = what.strip_prefix("0x").and_then(|hex| u32::from_str_radix(hex, 16).ok());
         let what = match product {
-            Some(product) => What::Product(product),
-            None if what.is_empty() => What::Any,
-            None => What::Type(what.to_owned()),
+            Some(product) => SearchTerm::Product(product),
+            None if what.is_empty() => SearchTerm::Any,
+            None => SearchTerm::Type(what.to_owned()),
         };
         Ok(Self { what, revision })
     }
 
     fn fits(&self, device: &EsiDevice) -> bool {
         match &self.what {
-            What::Any => true,
-            What::Type(name) => device.type_name.eq_ignore_ascii_case(name),
-            What::Product(code) => device.product_code == *code,
+            SearchTerm::Any => true,
+            SearchTerm::Type(name) => device.type_name.eq_ignore_ascii_case(name),
+            SearchTerm::Product(code) => device.product_code == *code,
         }
     }
 }
@@ -105,9 +105,9 @@ impl Selection {
 impl fmt::Display for Selection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.what {
-            What::Any => f.write_str("any"),
-            What::Type(name) => f.write_str(name),
-            What::Product(code) => write!(f, "0x{code:08X}"),
+            SearchTerm::Any => f.write_str("any"),
+            SearchTerm::Type(name) => f.write_str(name),
+            SearchTerm::Product(code) => write!(f, "0x{code:08X}"),
         }
     }
 }
@@ -130,7 +130,7 @@ impl Esi {
         let Some(newest) = fitting.iter().max_by_key(|one| one.revision) else {
             return Err(self.unknown(selection));
         };
-        if selection.what == What::Any
+        if selection.what == SearchTerm::Any
             && fitting.iter().any(|one| one.type_name != newest.type_name)
         {
             let has = self.near("");

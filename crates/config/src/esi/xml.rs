@@ -145,7 +145,7 @@ pub(crate) fn walk_some(
 ) -> Result<(), EsiError> {
     let mut reader = Reader::from_str(text);
     reader.config_mut().expand_empty_elements = true;
-    let mut source = Source { reader, text, counted: 0, line: 1, elements: 0 };
+    let mut source = XmlSource { reader, text, counted: 0, line: 1, elements: 0 };
     let mut path: Vec<String> = Vec::new();
     let mut seen = false;
     loop {
@@ -191,7 +191,7 @@ pub(crate) fn walk_some(
     }
 }
 
-struct Source<'a> {
+struct XmlSource<'a> {
     reader: Reader<&'a [u8]>,
     text: &'a str,
     /// Bytes whose lines have been counted.
@@ -200,7 +200,7 @@ struct Source<'a> {
     elements: usize,
 }
 
-impl<'a> Source<'a> {
+impl<'a> XmlSource<'a> {
     fn next(&mut self) -> Result<Event<'a>, EsiError> {
         let from = usize::try_from(self.reader.buffer_position()).unwrap_or(usize::MAX);
         self.count_to(from);

@@ -53,9 +53,8 @@ impl Default for AutomaticActions {
 }
 
 /// Which commands carry the process data of a SubDevice (FRM-26).
-#[derive(
-    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum ProcessAccess {
     /// LRW where its description does not forbid it.
@@ -68,9 +67,8 @@ pub enum ProcessAccess {
 }
 
 /// How a SubDevice may be addressed (FRM-28).
-#[derive(
-    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum AddressingChoice {
     /// By its position until it has its station address, by that from then on.
@@ -123,9 +121,8 @@ impl ClockSettings {
 }
 
 /// What becomes of inputs when the working counter of their datagram is wrong (FRM-17, FRM-18).
-#[derive(
-    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum OnWrongCounter {
     /// The last good ones stay.

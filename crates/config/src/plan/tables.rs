@@ -95,7 +95,7 @@ fn frame_tables_of_the_sources() {
     }
 }
 
-// proves: SYN-15 partial: the planner, without the command line
+// proves: SYN-15
 #[test]
 fn separate_inputs_come_first_and_earlier() {
     let plan = plan!("separate-inputs.toml");

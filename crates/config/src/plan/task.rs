@@ -26,9 +26,8 @@ pub struct Task {
 }
 
 /// When the frames of a task leave (SYN-13, SYN-14).
-#[derive(
-    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum IoAt {
     /// When the cycle begins, with the outputs of the last one: steady, for motion.

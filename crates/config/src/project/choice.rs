@@ -9,7 +9,8 @@ use crate::plan::{ClockSettings, IoAt, OnWrongCounter, ProcessAccess, WatchdogSe
 use crate::profile::ClockMode;
 
 /// The network as a whole: table `[network]`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Network {
     /// Which SubDevices share datagrams.
@@ -24,7 +25,7 @@ pub struct Network {
     /// Read in every cycle which mailboxes hold something, instead of asking each now and then.
     pub mailbox_states: bool,
     /// The unit of `pre_ticks`, in µs.
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub base_time_us: u32,
     /// A SubDevice that left its state is brought back, unless it says otherwise; else it stays there until somebody asks for
     /// a state.
@@ -40,7 +41,7 @@ pub struct Network {
     /// How far a clock may be off the reference clock before that is told and the network counts as out of
     /// step, in ns; 1000 unless said.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub sync_window_ns: Option<u32>,
     /// A port whose link was lost stays closed when the link is back, until the MainDevice has prepared the
     /// section behind it and orders it to open; else it opens by itself, at once.
@@ -67,13 +68,14 @@ impl Default for Network {
 }
 
 /// A task: `[[task]]`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ProjectTask {
     /// Unique name.
     pub name: String,
     /// Cycle time in µs.
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub cycle_us: u32,
     /// When its frames leave: when its cycle begins, or when the application has finished.
     #[serde(default)]
@@ -86,7 +88,7 @@ pub struct ProjectTask {
     pub pre_ticks: u32,
     /// How often a frame is sent again at once, if all SubDevices in it allow that (`frame_repeat`).
     #[serde(default)]
-    #[schemars(range(max = 3))]
+    #[cfg_attr(feature = "schema", schemars(range(max = 3)))]
     pub repeats: u8,
 }
 
@@ -138,7 +140,8 @@ impl Network {
 }
 
 /// The distributed clock of a device: `clock = { … }`. What is not said is that of the mode.
-#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ClockChoice {
     /// An operation mode of its description, by name.
@@ -230,9 +233,8 @@ fn ns(value: i64) -> String {
 }
 
 /// Watchdogs of a device: `watchdog = { … }`; what is not said stays as the device has it.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WatchdogChoice {
     /// Divider (0x0400) in units of 40 ns, less 2; 2498 makes steps of 100 µs.
@@ -254,7 +256,8 @@ impl WatchdogChoice {
 }
 
 /// Other entries for a PDO: `[[device.mapping]]`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Mapping {
     /// Index of the PDO.
@@ -265,11 +268,12 @@ pub struct Mapping {
 
 /// A command at start-up: `[[device.start_up]]`, for an object, for registers, for an identification
 /// number of a drive, or for the addresses of an Ethernet port.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StartUpEntry {
     /// When: `IP`, `PS`, `SO` and so on.
-    #[schemars(regex(pattern = "^[IPSOB]{2}$"))]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^[IPSOB]{2}$")))]
     pub transition: String,
     /// Index of the object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -285,11 +289,11 @@ pub struct StartUpEntry {
     pub register: Option<u16>,
     /// An identification number of a drive that speaks SoE, such as `S-0-0032`, instead of an object.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(regex(pattern = "^[SP]-[0-7]-[0-9]{1,4}$"))]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^[SP]-[0-7]-[0-9]{1,4}$")))]
     pub idn: Option<String>,
     /// With `idn`: which drive of the device.
     #[serde(default)]
-    #[schemars(range(max = 7))]
+    #[cfg_attr(feature = "schema", schemars(range(max = 7)))]
     pub drive: u8,
     /// Addresses of an Ethernet port, instead of an object and data.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -11,7 +11,8 @@ use crate::esi::device::{letters, physics};
 use crate::profile::{DeviceProfile, Mailbox, MappedEntry, MappedPdo, ProcessSyncManager};
 
 /// A type of device.
-#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Description {
     /// Current from the E-bus in mA; negative supplies.
@@ -51,7 +52,8 @@ fn is_zero(number: &u16) -> bool {
 }
 
 /// A mailbox.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DescribedMailbox {
     /// Address and length of what the device receives.
@@ -70,7 +72,8 @@ pub struct DescribedMailbox {
 }
 
 /// A SyncManager for process data.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DescribedSyncManager {
     /// Its number.
@@ -90,7 +93,8 @@ pub struct DescribedSyncManager {
 }
 
 /// A PDO.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DescribedPdo {
     /// Index of its mapping object.
@@ -109,7 +113,8 @@ pub struct DescribedPdo {
 }
 
 /// A piece of a PDO.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DescribedEntry {
     /// Index of its object; 0 is padding.
@@ -129,7 +134,8 @@ pub struct DescribedEntry {
 }
 
 /// Which way process data flow.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Way {
     /// To the device.
@@ -139,7 +145,8 @@ pub enum Way {
 }
 
 /// What an FMMU is meant for.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FmmuWord {
     /// Outputs.

@@ -20,7 +20,8 @@ use crate::plan::{AddressingChoice, OnWrongCounter, ProcessAccess};
 use crate::start_up::Transition;
 
 /// A SubDevice of a project.
-#[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ProjectDevice {
     /// Unique name.
@@ -50,14 +51,14 @@ pub struct ProjectDevice {
     pub on: Attachment,
     /// The port by which it is entered, `A` unless said.
     #[serde(default = "port_a")]
-    #[schemars(regex(pattern = "^[A-D]$"))]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^[A-D]$")))]
     pub entry: String,
     /// Station address; 0x1001 and up by position in the order of frames unless said.
     #[serde(default)]
     pub station: Option<u16>,
     /// How far it is driven: `OP` unless said, `SAFEOP`, `PREOP`, `INIT` or `BOOT`.
     #[serde(default)]
-    #[schemars(regex(pattern = "^(INIT|PREOP|SAFEOP|OP|BOOT)$"))]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^(INIT|PREOP|SAFEOP|OP|BOOT)$")))]
     pub state: Option<String>,
     /// The task that exchanges its process data; the first unless said.
     #[serde(default)]

@@ -6,12 +6,13 @@ use linesman_proto::mailbox::eoe::{ADDRESS_LEN, IpParameters};
 use serde::{Deserialize, Serialize};
 
 /// Addresses; what is not said stays as the device has it.
-#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EthernetChoice {
     /// Which port of the device, from 0.
     #[serde(default)]
-    #[schemars(range(max = 15))]
+    #[cfg_attr(feature = "schema", schemars(range(max = 15)))]
     pub port: u8,
     /// IP address, such as `192.168.1.11`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -43,7 +43,8 @@ pub use ethernet::EthernetChoice;
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
 
 /// A project.
-#[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Project {
     /// What the machine is called.
@@ -67,7 +68,8 @@ pub struct Project {
 }
 
 /// The far end of a ring.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Ring {
     /// The port that is wired to the second card, such as `B9.B`.

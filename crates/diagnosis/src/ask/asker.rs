@@ -49,7 +49,7 @@ pub struct AskSetup {
 }
 
 #[derive(Clone, PartialEq, Eq, Debug)]
-enum Phase {
+enum AskerPhase {
     /// The ways of the MainDevice are learnt, since this time.
     Learning(Instant),
     /// Do all controllers answer to the carrier?
@@ -74,7 +74,7 @@ struct PendingQuestion {
 #[derive(Clone, Debug)]
 pub struct Asker {
     setup: AskSetup,
-    phase: Phase,
+    phase: AskerPhase,
     carrier: Carrier,
     gaps: Gaps,
     guard: DisturbanceWatch,
@@ -107,7 +107,7 @@ impl Asker {
     pub fn new(setup: AskSetup) -> Self {
         Self {
             setup: AskSetup { per_s: setup.per_s.max(1), ..setup },
-            phase: Phase::Learning(Instant::ZERO),
+            phase: AskerPhase::Learning(Instant::ZERO),
             carrier: Carrier::Udp,
             gaps: Gaps::default(),
             guard: DisturbanceWatch::default(),
@@ -199,8 +199,10 @@ impl Asker {
         self.settle(now, model);
         self.look_at = None;
         let is_ready = match self.phase {
-            Phase::Learning(_) | Phase::Ended(_) => false,
-            Phase::Trial { .. } | Phase::Asking => self.out.is_none() && !self.guard.is_in_doubt(),
+            AskerPhase::Learning(_) | AskerPhase::Ended(_) => false,
+            AskerPhase::Trial { .. } | AskerPhase::Asking => {
+                self.out.is_none() && !self.guard.is_in_doubt()
+            }
         };
         if !is_ready {
             return None;
@@ -224,8 +226,8 @@ impl Asker {
     pub fn poll_timeout(&self) -> Option<Instant> {
         let out = self.out.as_ref().map(|out| out.gives_up);
         let [learnt, steady] = match self.phase {
-            Phase::Learning(since) => [Some(since), self.guard.last_order()],
-            Phase::Trial { .. } | Phase::Asking | Phase::Ended(_) => [None, None],
+            AskerPhase::Learning(since) => [Some(since), self.guard.last_order()],
+            AskerPhase::Trial { .. } | AskerPhase::Asking | AskerPhase::Ended(_) => [None, None],
         }
         .map(|from| from.map(|from| from + LEARN));
         let all = [out, learnt, steady, self.look_at, self.pairing.timeout(), self.guard.timeout()];
@@ -249,9 +251,9 @@ impl Asker {
         };
         AskingReport {
             state: match &self.phase {
-                Phase::Learning(_) => AskingState::Learning,
-                Phase::Trial { .. } | Phase::Asking => AskingState::Asking,
-                Phase::Ended(over) => over.state(),
+                AskerPhase::Learning(_) => AskingState::Learning,
+                AskerPhase::Trial { .. } | AskerPhase::Asking => AskingState::Asking,
+                AskerPhase::Ended(over) => over.state(),
             },
             carrier: (self.questions > 0).then_some(match self.carrier {
                 Carrier::Udp => CarrierName::Udp,
@@ -271,7 +273,7 @@ impl Asker {
 
     /// Why no question is sent, and what to do about it.
     fn reason(&self, now: Instant) -> Option<(String, String)> {
-        if let Phase::Ended(over) = &self.phase {
+        if let AskerPhase::Ended(over) = &self.phase {
             return Some((over.reason(), over.next_step().to_owned()));
         }
         if !self.gaps.is_driven(now) {
@@ -288,7 +290,7 @@ impl Asker {
                 "have the program of the MainDevice read the counters".to_owned(),
             ));
         }
-        if matches!(self.phase, Phase::Learning(_)) {
+        if matches!(self.phase, AskerPhase::Learning(_)) {
             let reason = format!("the MainDevice did not run steadily for {LEARN}");
             return Some((reason, "listen longer, `--seconds 60`".to_owned()));
         }
@@ -310,13 +312,13 @@ impl Asker {
         }
         self.guard.look(now, self.gaps.cycle());
         match self.phase {
-            Phase::Learning(since) => self.learn(since, now, model),
-            Phase::Trial { .. } | Phase::Asking => {
+            AskerPhase::Learning(since) => self.learn(since, now, model),
+            AskerPhase::Trial { .. } | AskerPhase::Asking => {
                 if let Some((disturbance, is_near)) = self.guard.take_found() {
                     self.disturbed(disturbance, is_near, now);
                 }
             }
-            Phase::Ended(_) => {}
+            AskerPhase::Ended(_) => {}
         }
     }
 
@@ -334,7 +336,7 @@ impl Asker {
             before.late += fared.late;
         }
         self.out = None;
-        self.phase = Phase::Learning(now);
+        self.phase = AskerPhase::Learning(now);
         self.news = Some(News::Again(disturbance));
     }
 
@@ -352,7 +354,7 @@ impl Asker {
             .filter(|_| self.gaps.cycle().is_none() || now.since(since) < ALWAYS);
         let is_steady = last_order.is_none_or(|order| now.since(order) >= LEARN);
         if !self.gaps.is_driven(now) {
-            self.phase = Phase::Learning(now);
+            self.phase = AskerPhase::Learning(now);
             return;
         }
         if now.since(since) < LEARN || !is_steady || self.guard.others.frames < LEARN_FRAMES {
@@ -364,19 +366,19 @@ impl Asker {
             return self.end(EndReason::Refused(refusal));
         }
         self.guard.begin(self.gaps.cycle());
-        self.phase = Phase::Trial { tries: 0, most: 0 };
+        self.phase = AskerPhase::Trial { tries: 0, most: 0 };
         self.next = now;
     }
 
     fn end(&mut self, over: EndReason) {
         self.out = None;
-        self.phase = Phase::Ended(over.clone());
+        self.phase = AskerPhase::Ended(over.clone());
         self.news = Some(News::Ended(over));
     }
 
     /// A trial of the carrier has ended: so many controllers answered.
     fn tried(&mut self, answered: u16, model: &NetworkModel) {
-        let Phase::Trial { tries, most } = &mut self.phase else { return };
+        let AskerPhase::Trial { tries, most } = &mut self.phase else { return };
         (*tries, *most) = (*tries + 1, (*most).max(answered));
         let (tries, most) = (*tries, *most);
         let kind = model.habits.recognised().map_or(MainDeviceKind::Unknown, |found| found.kind);
@@ -385,7 +387,7 @@ impl Asker {
             counted.unwrap_or_else(|| u16::try_from(model.device_count()).unwrap_or(u16::MAX));
         if most > 0 && most >= present {
             self.turns.begin(most, kind);
-            self.phase = Phase::Asking;
+            self.phase = AskerPhase::Asking;
             self.news = Some(News::Begun(self.carrier));
             return;
         }
@@ -395,7 +397,7 @@ impl Asker {
         match carrier::plain(kind, self.highest_index).filter(|_| self.carrier == Carrier::Udp) {
             Some(plain) => {
                 self.carrier = plain;
-                self.phase = Phase::Trial { tries: 0, most: 0 };
+                self.phase = AskerPhase::Trial { tries: 0, most: 0 };
             }
             None => self.end(EndReason::NoCarrier { answered: most, present, kind }),
         }
@@ -403,8 +405,8 @@ impl Asker {
 
     fn ask(&mut self, now: Instant, model: &NetworkModel, buffer: &mut [u8]) -> Option<usize> {
         let question = match self.phase {
-            Phase::Asking => Some(self.turns.next(model)?),
-            Phase::Trial { .. } | Phase::Learning(_) | Phase::Ended(_) => None,
+            AskerPhase::Asking => Some(self.turns.next(model)?),
+            AskerPhase::Trial { .. } | AskerPhase::Learning(_) | AskerPhase::Ended(_) => None,
         };
         let index = self.carrier.index(self.questions);
         let len = build(self.carrier, index, question.as_ref(), buffer)?;

@@ -30,7 +30,7 @@ const PAUSE: Span = Span::ms(100);
 const QUIET: Span = Span::ms(2_500);
 
 /// A task: command, logical address and length of a datagram with process data.
-type Task = (u8, u32, u16);
+type CyclicTask = (u8, u32, u16);
 
 /// What may be done at a time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -46,7 +46,7 @@ pub enum SendWindow {
 /// The ways of a MainDevice, as far as gaps depend on them.
 #[derive(Clone, Default, Debug)]
 pub struct Gaps {
-    tasks: BTreeMap<Task, CycleTiming>,
+    tasks: BTreeMap<CyclicTask, CycleTiming>,
     /// When the frames were sent that are under way.
     out: VecDeque<Instant>,
     last_sent: Option<Instant>,

@@ -6,7 +6,8 @@ use super::disturbance::FrameOutcomes;
 use crate::report::Number;
 
 /// Questions beside another MainDevice: `diagnose listen:… --ask`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AskingReport {
     /// How it stands at the end.
@@ -34,7 +35,8 @@ pub struct AskingReport {
 }
 
 /// How it stands with the questions.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum AskingState {
     /// The ways of the MainDevice are learnt, and nothing was sent yet, or nothing since it was in trouble.
@@ -50,7 +52,8 @@ pub enum AskingState {
 }
 
 /// The form of questions.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CarrierName {
     /// In UDP.
@@ -60,7 +63,8 @@ pub enum CarrierName {
 }
 
 /// Frames, and how many of them fared badly.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FaredReport {
     /// Frames.

@@ -140,6 +140,7 @@ impl Bench {
             number: self.now.as_nanos() / 1_000,
             fcs: None,
             truncated: false,
+            probe: None,
             bytes,
         };
         self.engine.handle_frame(&seen);

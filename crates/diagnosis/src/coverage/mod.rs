@@ -26,7 +26,9 @@ const ASK: &str =
     "on its own computer, have it read beside its cycle: `linesman diagnose WHERE --ask`";
 
 /// A way by which evidence came in: it decides which next steps there are.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
 pub enum InputKind {
     /// This program drives the line, or reads it while nobody drives it.
     Driven,
@@ -42,19 +44,8 @@ pub enum InputKind {
 }
 
 /// Faults that show in the same evidence.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Debug,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Subject {
     /// Frames that do not come back, or come back damaged.
@@ -162,19 +153,8 @@ impl Subject {
 }
 
 /// How far a subject was judged.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Debug,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Extent {
     /// Not at all: a fault of this kind would not have shown.
@@ -186,19 +166,8 @@ pub enum Extent {
 }
 
 /// Why a subject, or a part of it, was not judged.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Debug,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Reason {
     /// No frame was seen: registers alone were read, or copied from a tool.
@@ -211,6 +180,8 @@ pub enum Reason {
     FramesCut,
     /// Frames did not come back, and nothing tells why.
     FramesLost,
+    /// The recording ended while frames were on their way, or with them.
+    EndOpen,
     /// Frames came back a second time.
     FramesDoubled,
     /// Frames passed, and the diagnosis was too slow to look at them.

@@ -9,9 +9,17 @@ const STATIONS_NAMED: usize = 8;
 
 /// Assesses who is there.
 pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
+    let mut all = Assessment::judged(Subject::Presence);
+    compare_number(basis, &mut all);
+    list_unanswered(basis, &mut all);
+    compare_broadcasts(basis, &mut all);
+    all
+}
+
+/// Number of SubDevices that answer, against the number that should.
+fn compare_number(basis: &Basis<'_>, all: &mut Assessment) {
     let model = basis.model;
     let traffic = &model.traffic;
-    let mut all = Assessment::judged(Subject::Presence);
     let is_counted = traffic.broadcasts.most() > 0 || traffic.broadcasts.positions() > 0;
     if model.device_count() == 0 {
         let text = "no SubDevice was seen to answer";
@@ -39,6 +47,11 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
             .step("compare the line with what was planned: `linesman scan WHERE --against FILE`");
         all.lacks(Extent::InPart, gap);
     }
+}
+
+/// SubDevices, station addresses and datagrams that nobody answered.
+fn list_unanswered(basis: &Basis<'_>, all: &mut Assessment) {
+    let model = basis.model;
     let silent: Vec<&Device> = model.devices.iter().filter(|one| is_missed(model, one)).collect();
     if !silent.is_empty() {
         let places = silent.iter().map(|one| Place::device(model.network, one.id)).collect();
@@ -60,13 +73,19 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::InPart, gap);
     }
     // Those of lost frames are told with these. Who brings a line up asks for what is not there.
-    let unanswered = traffic.datagrams.unanswered_alone();
+    let unanswered = model.traffic.datagrams.unanswered_alone();
     if basis.input != InputKind::Driven && unanswered > 0 && silent.is_empty() {
         let text =
             format!("{unanswered} datagrams came back without an answer, and nothing tells why");
         let gap = Gap::new(Reason::NoAnswer, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
+}
+
+/// Numbers of SubDevices that answered broadcasts at different times.
+fn compare_broadcasts(basis: &Basis<'_>, all: &mut Assessment) {
+    let model = basis.model;
+    let traffic = &model.traffic;
     let now = traffic.broadcasts.now().map_or(traffic.broadcasts.most(), |now| now.value);
     if now < traffic.broadcasts.most() {
         let text = format!(
@@ -85,7 +104,6 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
-    all
 }
 
 /// Whether a SubDevice was asked in vain, or is planned and nothing was seen of it.

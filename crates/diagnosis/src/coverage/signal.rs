@@ -49,26 +49,13 @@ pub(super) fn all_tell(model: &NetworkModel) -> bool {
 pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
     let model = basis.model;
     let traffic = &model.traffic;
-    let mut all = Assessment::judged(Subject::SignalQuality);
     // Frames that are spoiled are lost; enough that came back make up for counters that nobody read.
     let frames_tell = traffic.losses.frames().sum == 0 && traffic.losses.damaged().sum == 0;
     let is_shown_by_frames = basis.has_frames && frames_tell;
     let Some(input) = LocateInput::of(model, true) else {
-        let is_unread = model.devices.iter().all(|device| !device.counters.is_known());
-        let (reason, text) = if is_unread {
-            (Reason::CountersNotRead, "nobody read the error counters")
-        } else {
-            (Reason::WiringUnknown, "the wiring is not known, so no link can be told from another")
-        };
-        let has_risen = model.devices.iter().any(has_risen);
-        let text =
-            if has_risen { format!("{text}, and some counted errors") } else { text.to_owned() };
-        let gap = Gap::new(reason, text)
-            .essential_if(!is_shown_by_frames || has_risen)
-            .step(basis.read_counters());
-        all.lacks(Extent::NotJudged, gap);
-        return all;
+        return quality_without_wiring(basis, is_shown_by_frames);
     };
+    let mut all = Assessment::judged(Subject::SignalQuality);
     let mut told: Vec<(PortEvidence, Place)> = Vec::new();
     let mut last_hops = Vec::new();
     for hop in input.routes().iter().flat_map(|route| route.hops()) {
@@ -130,6 +117,25 @@ pub(super) fn quality(basis: &Basis<'_>) -> Assessment {
         let gap = Gap::new(Reason::HostCountersMissing, text).at(last_hops).step(host_step(basis));
         all.lacks(Extent::InPart, gap);
     }
+    all
+}
+
+/// Error counters of a line whose links cannot be told apart.
+fn quality_without_wiring(basis: &Basis<'_>, is_shown_by_frames: bool) -> Assessment {
+    let devices = &basis.model.devices;
+    let is_unread = devices.iter().all(|device| !device.counters.is_known());
+    let (reason, text) = if is_unread {
+        (Reason::CountersNotRead, "nobody read the error counters")
+    } else {
+        (Reason::WiringUnknown, "the wiring is not known, so no link can be told from another")
+    };
+    let has_risen = devices.iter().any(has_risen);
+    let text = if has_risen { format!("{text}, and some counted errors") } else { text.to_owned() };
+    let gap = Gap::new(reason, text)
+        .essential_if(!is_shown_by_frames || has_risen)
+        .step(basis.read_counters());
+    let mut all = Assessment::judged(Subject::SignalQuality);
+    all.lacks(Extent::NotJudged, gap);
     all
 }
 

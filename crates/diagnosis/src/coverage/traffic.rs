@@ -20,7 +20,6 @@ const LONG_GAP: Span = Span::s(1);
 
 /// Lost frames.
 pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
-    let traffic = &basis.model.traffic;
     let mut all = Assessment::judged(Subject::Frames);
     if !basis.has_frames && basis.model.reported.lost.is_none() {
         let shows_elsewhere = !basis.model.cyclic.is_empty() || basis.counters_tell;
@@ -31,6 +30,15 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::NotJudged, gap);
         return all;
     }
+    list_unrecorded(basis, &mut all);
+    list_lost(basis, &mut all);
+    list_in_flight(basis, &mut all);
+    all
+}
+
+/// Frames that the input lacks.
+fn list_unrecorded(basis: &Basis<'_>, all: &mut Assessment) {
+    let traffic = &basis.model.traffic;
     if traffic.is_one_sided() {
         let text = "frames of one direction only: lost frames cannot be told from answers";
         let gap = Gap::new(Reason::OneDirection, text).essential().step(
@@ -59,16 +67,27 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         all.lacks(Extent::InPart, gap);
     }
     if traffic.recording.missed() > 0 {
+        let is_recorded = basis.input == InputKind::Recorded;
+        let who = if is_recorded { "the recorder" } else { "the diagnosis" };
         let text = format!(
-            "the diagnosis did not keep up and missed {} of {} frames",
+            "{who} did not keep up and missed {} of {} frames",
             traffic.recording.missed(),
             traffic.recording.frames() + traffic.recording.missed()
         );
-        let gap = Gap::new(Reason::FramesMissed, text).essential().step(
-            "end other programs on this computer, or record the line and judge the recording: `--record`",
-        );
+        let step = match is_recorded {
+            true => "record anew, with fewer other programs on that computer or a larger buffer",
+            false => {
+                "end other programs on this computer, or record the line and judge the recording: `--record`"
+            }
+        };
+        let gap = Gap::new(Reason::FramesMissed, text).essential().step(step);
         all.lacks(Extent::InPart, gap);
     }
+}
+
+/// Frames that did not come back as they should.
+fn list_lost(basis: &Basis<'_>, all: &mut Assessment) {
+    let traffic = &basis.model.traffic;
     let lost = traffic.losses.frames().sum;
     if lost > 0 {
         let frames = if lost == 1 { "frame" } else { "frames" };
@@ -112,7 +131,25 @@ pub(super) fn frames(basis: &Basis<'_>) -> Assessment {
         );
         all.lacks(Extent::InPart, gap);
     }
-    all
+}
+
+/// Frames that were on their way when a recording ended, or were lost just before.
+fn list_in_flight(basis: &Basis<'_>, all: &mut Assessment) {
+    let in_flight = &basis.model.traffic.in_flight;
+    let unsettled = in_flight.unsettled();
+    // Who listens or drives looks on until the frames are due, and so does who notes when the recording ended.
+    if unsettled == 0 || basis.input != InputKind::Recorded || in_flight.is_end_known() {
+        return;
+    }
+    let frames = if unsettled == 1 { "1 frame" } else { &format!("{unsettled} frames") };
+    let text = format!(
+        "{frames} had not come back when the recording ended: whether it ended just then, or the line did, is not told"
+    );
+    // Parts that are cut out of a recording end so as often as not.
+    let gap = Gap::new(Reason::EndOpen, text).step(
+        "record on for some seconds, with a recorder that notes its end: `linesman capture record`, or dumpcap",
+    );
+    all.lacks(Extent::InPart, gap);
 }
 
 /// Times.

@@ -16,7 +16,7 @@ use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Finding, FindingStore, Severity};
 use crate::model::{NetworkModel, search};
-use crate::observe::{FrameSeen, HostEvent, HostObservation, Pairing};
+use crate::observe::{Exchange, FrameSeen, HostEvent, HostObservation, LatestFrame, Pairing};
 use crate::report::{
     self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
 };
@@ -67,6 +67,7 @@ impl Engine {
         model.expect_exchange(&setup.exchange);
         model.host.is_watched = setup.host_counters;
         model.sees_all_orders = setup.input == InputKind::Driven;
+        model.reported.exchanges.clone_from(&setup.exchanges);
         Self {
             setup,
             networks: vec![NetworkWatch::new(model)],
@@ -83,7 +84,8 @@ impl Engine {
 
     /// An engine for a line that was filled in by other means, such as an observation file.
     #[must_use]
-    pub fn with_line(setup: Setup, model: NetworkModel) -> Self {
+    pub fn with_line(setup: Setup, mut model: NetworkModel) -> Self {
+        model.reported.exchanges.extend_from_slice(&setup.exchanges);
         let now = model.now;
         let mut engine = Self { networks: vec![NetworkWatch::new(model)], now, ..Self::new(setup) };
         engine.judge();
@@ -92,10 +94,20 @@ impl Engine {
 
     /// Takes a frame.
     pub fn handle_frame(&mut self, frame: &FrameSeen<'_>) {
+        self.handle_frame_with(frame, &mut |_, _| {});
+    }
+
+    /// Takes a frame, and shows each exchange that it completes or settles to `observe`, with what is known of the
+    /// network then. Questions of this program are not shown.
+    pub fn handle_frame_with(
+        &mut self,
+        frame: &FrameSeen<'_>,
+        observe: &mut impl FnMut(&NetworkModel, &Exchange<'_>),
+    ) {
         self.now = self.now.max(frame.time);
         let now = self.now;
         let watched = self.watched(frame.network);
-        intake::take(watched, frame, now);
+        intake::take_copy(watched, frame, now, observe);
         self.background_poll();
         self.judge_if_due();
     }
@@ -155,7 +167,7 @@ impl Engine {
         self.now = self.now.max(now);
         for watched in &mut self.networks {
             watched.model.now = watched.model.now.max(now);
-            watched.expire(now, false);
+            watched.expire(now, false, &mut |_, _| {});
         }
         self.background_poll();
         self.judge_if_due();
@@ -193,11 +205,22 @@ impl Engine {
 
     /// The input ends at `at`. `complete` is whether all of it could be read.
     pub fn finish(&mut self, at: Instant, complete: bool) {
+        self.finish_with(at, complete, &mut |_, _| {});
+    }
+
+    /// Ends the input as [`finish`](Self::finish), and shows each exchange that is settled by it to `observe`.
+    pub fn finish_with(
+        &mut self,
+        at: Instant,
+        complete: bool,
+        observe: &mut impl FnMut(&NetworkModel, &Exchange<'_>),
+    ) {
         self.now = self.now.max(at);
         self.has_ended = true;
         self.is_complete &= complete;
         for watched in &mut self.networks {
-            watched.expire(at, true);
+            intake::finish_copies(watched, at, observe);
+            watched.expire(at, true, observe);
             watched.model.touch();
         }
         self.judge();
@@ -227,6 +250,7 @@ impl Engine {
             asking: self.asking.clone(),
             coverage: report::coverage::report(&coverage),
             understood: None,
+            second_look: None,
             findings,
         }
     }
@@ -242,6 +266,13 @@ impl Engine {
     pub fn model(&self, network: Network) -> Option<&NetworkModel> {
         let mut all = self.networks.iter().map(|watched| &watched.model);
         all.find(|model| model.network == network)
+    }
+
+    /// What the latest frame of a network turned out to be; `None` before its first frame.
+    #[must_use]
+    pub fn latest_frame(&self, network: Network) -> Option<&LatestFrame> {
+        let mut all = self.networks.iter();
+        all.find(|watched| watched.model.network == network).map(|watched| &watched.latest)
     }
 
     fn watched(&mut self, network: Network) -> &mut NetworkWatch {

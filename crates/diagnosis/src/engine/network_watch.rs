@@ -9,7 +9,8 @@ use super::bisect::{self, Bisect};
 use super::fast_poll::FastPoll;
 use crate::finding::Condition;
 use crate::model::{Learner, NetworkModel, Silence};
-use crate::observe::{Fingerprint, FrameSeen, Pairing};
+use crate::observe::capture_probe::ProbePassages;
+use crate::observe::{Exchange, Fingerprint, FrameSeen, LatestFrame, Pairing};
 
 /// For so long after its last rise a counter is watched in this way.
 const WATCHED_AFTER_RISE: Span = Span::s(15);
@@ -29,6 +30,10 @@ pub(super) struct NetworkWatch {
     pub(super) model: NetworkModel,
     pub(super) learner: Learner,
     pub(super) pairing: Pairing,
+    /// Role of the latest frame.
+    pub(super) latest: LatestFrame,
+    /// Copies of frames that a capture probe has recorded.
+    pub(super) capture_probe: ProbePassages,
     /// Questions that are under way.
     pub(super) questions: Pairing,
     pub(super) judged: u64,
@@ -50,10 +55,13 @@ pub(super) struct NetworkWatch {
 impl NetworkWatch {
     pub(super) fn new(model: NetworkModel) -> Self {
         let learner = Learner::new(&model);
+        let capture_probe = ProbePassages::on_line(model.tree_is_planned);
         Self {
             model,
             learner,
             pairing: Pairing::default(),
+            latest: LatestFrame::default(),
+            capture_probe,
             questions: Pairing::default(),
             judged: 0,
             judged_alarms: (0, 0),
@@ -76,13 +84,25 @@ impl NetworkWatch {
     }
 
     /// Gives up what does not come back: by `now`, or all of it, as the input has ended.
-    pub(super) fn expire(&mut self, now: Instant, has_ended: bool) {
+    pub(super) fn expire(
+        &mut self,
+        now: Instant,
+        has_ended: bool,
+        observe: &mut impl FnMut(&NetworkModel, &Exchange<'_>),
+    ) {
         let Self { model, learner, pairing, questions, .. } = self;
+        let mut settle = |exchange: &Exchange<'_>| {
+            learner.learn(model, exchange);
+            observe(model, exchange);
+        };
         if has_ended {
-            pairing.finish(&mut |exchange| learner.learn(model, exchange));
-            questions.finish(&mut |exchange| learner.learn_answer(model, exchange));
+            pairing.finish(now, &mut settle);
+            if model.traffic.recording.last().is_some_and(|last| last < now) {
+                model.traffic.in_flight.record_known_end();
+            }
+            questions.finish(now, &mut |exchange| learner.learn_answer(model, exchange));
         } else {
-            pairing.expire(now, &mut |exchange| learner.learn(model, exchange));
+            pairing.expire(now, &mut settle);
             questions.expire(now, &mut |exchange| learner.learn_answer(model, exchange));
         }
     }

@@ -6,8 +6,10 @@ use linesman_proto::address::{DeviceId, Network, RegisterAddress, StationAddress
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::Instant;
 
+use super::Engine;
 use crate::coverage::InputKind;
 use crate::finding::Change;
+use crate::model::reported::PartExchange;
 use crate::report::FindingReport;
 
 /// What the engine is told before it begins.
@@ -31,6 +33,16 @@ pub struct Setup {
     pub start: Option<String>,
     /// The clock behind the times.
     pub clock: String,
+    /// Parts that were exchanged before, on account of an earlier diagnosis, of network 0.
+    pub exchanges: Vec<PartExchange>,
+}
+
+impl Engine {
+    /// Set-up of the diagnosis, with what it was told of the host since.
+    #[must_use]
+    pub const fn setup(&self) -> &Setup {
+        &self.setup
+    }
 }
 
 /// Something happened to a finding.

@@ -295,8 +295,13 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
 
 /// Whether a finding began so long after another one was over that this does not follow from it: what brings something
 /// about may be noticed a little later than that, not when it is history.
+///
+/// Damaged frames that the card drops are told at once, so that what came of them long before an outage is none of its
+/// doing, however long it went on.
 fn began_after(cause: &Finding, effect: &Finding) -> bool {
-    effect.closed.is_some_and(|closed| closed + AFTER < cause.opened)
+    let is_of_card = effect.condition.symptoms.iter().all(|one| *one == Symptom::CardErrors);
+    let was_before = is_of_card && effect.opened + AFTER_COUNTED < cause.opened;
+    was_before || effect.closed.is_some_and(|closed| closed + AFTER < cause.opened)
 }
 
 /// Whether a finding was over so long before another one that this does not follow from it.

@@ -9,14 +9,14 @@ use linesman_proto::topology::{Reconstruction, SeenController, Tree};
 
 use crate::model::{Device, NetworkModel};
 
-/// What was found, as far as it is enough to be laid upon the plan.
+/// Found wiring, as far as it is enough to be laid upon the plan.
 pub(crate) struct FoundWiring<'a> {
     pub(crate) model: &'a NetworkModel,
     pub(crate) planned: &'a Tree,
     pub(crate) wanted: Vec<Wanted>,
     pub(crate) tree: Tree,
     pub(crate) basis: Vec<EntryBasis>,
-    /// Whose answers those of a found node are taken for: positions move with what is missing.
+    /// SubDevices for whose answers those of the found nodes are taken: positions move with what is missing.
     pub(crate) ids: Vec<DeviceId>,
     pub(crate) there: Vec<There>,
     /// When the last of it was learnt.
@@ -104,7 +104,7 @@ impl<'a> FoundWiring<'a> {
             })
     }
 
-    /// Whether a comparison says anything that can be relied on.
+    /// True if a comparison says anything that can be relied on.
     pub(crate) fn tells(&self, comparison: &Comparison) -> bool {
         let ring = self.planned.ring_nodes();
         let is_gone = |difference: &Difference| {
@@ -129,7 +129,7 @@ impl<'a> FoundWiring<'a> {
     }
 }
 
-/// Whether the ring was seen closed, with everybody in it plugged in the right way round: frames of card A are
+/// True if the ring was seen closed, with everybody in it plugged in the right way round: frames of card A are
 /// processed by all of them, and those of card B by nobody.
 fn is_closed(model: &NetworkModel) -> bool {
     let by = model.traffic.broadcasts.processed_alone().map(|seen| seen.value);

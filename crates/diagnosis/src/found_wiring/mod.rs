@@ -16,17 +16,17 @@ pub(crate) use ring_half::{ReversedInRing, exchanged_cards, planned_ring};
 use crate::finding::Symptom;
 use crate::model::NetworkModel;
 
-/// Whether the trees can be compared, and differ: the comparison speaks of devices missing, extra and wrong, too.
+/// True if the trees can be compared, and differ: the comparison speaks of devices missing, extra and wrong, too.
 pub(crate) fn is_wired_otherwise(model: &NetworkModel) -> bool {
     FoundWiring::of(model).is_some_and(|found| found.tells(&found.compare()))
 }
 
-/// Whether somebody in a ring is plugged in the wrong way round, so that positions mean others than planned.
+/// True if somebody in a ring is plugged in the wrong way round, so that positions mean others than planned.
 pub(crate) fn is_reversed_in_ring(model: &NetworkModel) -> bool {
     ReversedInRing::of(model).is_some()
 }
 
-/// What is seen of those whose answers are taken for those of others, since they stand elsewhere than planned:
+/// Signs of SubDevices whose answers are taken for those of others, since they stand elsewhere than planned:
 /// ports without a link where one belongs, working counters too low, states never reached, silence.
 pub(crate) fn displaced(all: impl Iterator<Item = DeviceId>) -> impl Iterator<Item = Symptom> {
     all.flat_map(|id| {

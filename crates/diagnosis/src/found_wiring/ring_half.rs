@@ -30,7 +30,7 @@ pub(crate) fn planned_ring(model: &NetworkModel) -> Option<&Tree> {
     model.tree.as_ref().filter(|tree| model.tree_is_planned && tree.closes_at().is_some())
 }
 
-/// How many have processed either copy of a broadcast, if both were processed although the ring is closed.
+/// Working counters of both copies of a broadcast, if both were processed although the ring is closed.
 fn split(model: &NetworkModel, tree: &Tree) -> Option<Seen<(u16, u16)>> {
     // Not one that fewer, or more, have answered to since.
     let changed = model.traffic.broadcasts.now().map(|now| now.at);
@@ -49,7 +49,7 @@ pub(crate) fn exchanged_cards(model: &NetworkModel, tree: &Tree) -> Option<Seen<
     model.traffic.broadcasts.processed_alone().filter(|seen| seen.value == Path::B && is_whole)
 }
 
-/// Whether the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken
+/// True if the ring is open somewhere: both its ends have a link less than planned. Whose answers are taken
 /// for whose is not certain here, so it is counted how many there are with so many links.
 fn is_open(model: &NetworkModel, tree: &Tree) -> bool {
     let mut planned: Vec<usize> =
@@ -62,7 +62,7 @@ fn is_open(model: &NetworkModel, tree: &Tree) -> bool {
     })
 }
 
-/// Whether a planned one does not answer to its address.
+/// True if a planned one does not answer to its address.
 const fn is_silent(device: &Device) -> bool {
     device.answered.is_none() || device.silent.is_some()
 }
@@ -73,7 +73,7 @@ fn block(tree: &Tree, ring: &[usize], at: usize) -> Vec<usize> {
     tree.subtree(ring[at]).iter().copied().filter(|node| !further.contains(node)).collect()
 }
 
-/// Whose share of the line is as large as that of one copy. Of several it is the one by which identities fit:
+/// Split whose share of the line is as large as that of one copy. Of several it is the one by which identities fit:
 /// those of card B have the last addresses. Then the one of which most do not answer to their address.
 fn find(model: &NetworkModel, tree: &Tree, split: Seen<(u16, u16)>) -> Option<ReversedInRing> {
     let ring = tree.ring_nodes();
@@ -102,7 +102,7 @@ fn find(model: &NetworkModel, tree: &Tree, split: Seen<(u16, u16)>) -> Option<Re
     Some(ReversedInRing { node: ring[fitting[0]], others, split })
 }
 
-/// Whether who answers to the address of `found` cannot be the one planned as `planned`.
+/// True if the SubDevice that answers to the address of `found` cannot be the one planned as `planned`.
 fn is_another(model: &NetworkModel, planned: usize, found: usize) -> bool {
     let planned = model.devices.get(planned).and_then(|device| device.planned);
     let found = model.devices.get(found).and_then(|device| device.identity.identity());

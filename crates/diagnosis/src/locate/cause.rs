@@ -91,8 +91,8 @@ impl Suspicion {
     /// All causes on a line, in the order in which frames get there.
     #[must_use]
     pub fn all(input: &LocateInput<'_>, located: &Located) -> Vec<Self> {
-        let mut links: Vec<Group> = Vec::new();
-        let mut senders: Vec<Group> = Vec::new();
+        let mut links: Vec<DamageGroup> = Vec::new();
+        let mut senders: Vec<DamageGroup> = Vec::new();
         for damage in &located.hops {
             let both = located.hops.iter().any(|other| {
                 other.hop.link == damage.hop.link && other.hop.direction != damage.hop.direction
@@ -120,6 +120,9 @@ impl Suspicion {
                     };
                     group.last_hop = Some(last.clone());
                 }
+                // What else is damaged on that link may have cost these frames, too.
+                LastHop::Unknown { is_beside: true, .. }
+                    if links.iter().any(|group| group.key == link) => {}
                 LastHop::Unknown { .. } => group(&mut links, link).last_hop = Some(last.clone()),
             }
         }
@@ -136,13 +139,13 @@ impl Suspicion {
 
 /// Damage that belongs together: by link, or by the device that sent the frames.
 #[derive(Clone, Debug)]
-struct Group {
+struct DamageGroup {
     key: usize,
     damages: Vec<Damage>,
     last_hop: Option<LastHop>,
 }
 
-impl Group {
+impl DamageGroup {
     fn with(self, suspects: Vec<Suspect>) -> Suspicion {
         let Self { key: _, damages, last_hop } = self;
         Suspicion { damages, last_hop, suspects, beneath: Vec::new() }
@@ -157,11 +160,11 @@ impl Group {
     }
 }
 
-fn group(groups: &mut Vec<Group>, key: usize) -> &mut Group {
+fn group(groups: &mut Vec<DamageGroup>, key: usize) -> &mut DamageGroup {
     let index = match groups.iter().position(|group| group.key == key) {
         Some(index) => index,
         None => {
-            groups.push(Group { key, damages: Vec::new(), last_hop: None });
+            groups.push(DamageGroup { key, damages: Vec::new(), last_hop: None });
             groups.len() - 1
         }
     };
@@ -216,7 +219,7 @@ fn is_clean(damage: &Damage) -> bool {
 }
 
 /// Clean symbols, bad frames: whoever sends spoiled them before they were coded.
-fn inside(group: &Group) -> Vec<Suspect> {
+fn inside(group: &DamageGroup) -> Vec<Suspect> {
     let Some(damage) = group.damages.first() else { return Vec::new() };
     let frames: u64 = group.damages.iter().map(|damage| damage.frames).sum();
     let hop = damage.hop;
@@ -236,7 +239,7 @@ fn inside(group: &Group) -> Vec<Suspect> {
 }
 
 /// Links that are hit at the same times have one source; the first of them leads.
-fn share_source(input: &LocateInput<'_>, mut links: Vec<Group>) -> Vec<Suspicion> {
+fn share_source(input: &LocateInput<'_>, mut links: Vec<DamageGroup>) -> Vec<Suspicion> {
     links.sort_by_key(|group| group.damages.is_empty());
     let mut all: Vec<Suspicion> = Vec::new();
     let mut taken = vec![false; links.len()];
@@ -250,10 +253,10 @@ fn share_source(input: &LocateInput<'_>, mut links: Vec<Group>) -> Vec<Suspicion
         let leader = &links[index];
         let others = order[at + 1..].iter().copied().filter(|other| !taken[*other]);
         let together = with_same_source(input, &links, index, others);
-        let mut members: Vec<&Group> = vec![leader];
+        let mut members: Vec<&DamageGroup> = vec![leader];
         members.extend(together.iter().map(|other| &links[*other]));
         let common = (members.len() > 1).then(|| common_device(&members)).flatten();
-        let suspicion = |group: &Group| {
+        let suspicion = |group: &DamageGroup| {
             let list = if members.len() > 1 { shared(group, common) } else { single(input, group) };
             group.clone().with(list)
         };
@@ -270,7 +273,7 @@ fn share_source(input: &LocateInput<'_>, mut links: Vec<Group>) -> Vec<Suspicion
 /// Those of the `others` that are hit together with the first link, or with one that is.
 fn with_same_source(
     input: &LocateInput<'_>,
-    links: &[Group],
+    links: &[DamageGroup],
     first: usize,
     others: impl Iterator<Item = usize>,
 ) -> Vec<usize> {
@@ -295,7 +298,7 @@ fn with_same_source(
 }
 
 /// The device at whose ports all damage is sent, or all is received.
-fn common_device(groups: &[&Group]) -> Option<(usize, FaultName)> {
+fn common_device(groups: &[&DamageGroup]) -> Option<(usize, FaultName)> {
     let hops = || groups.iter().flat_map(|group| &group.damages).map(|damage| damage.hop);
     let first = hops().next()?;
     let sender = first.from.node().filter(|node| hops().all(|hop| hop.from.node() == Some(*node)));
@@ -308,7 +311,7 @@ fn common_device(groups: &[&Group]) -> Option<(usize, FaultName)> {
 }
 
 /// One of several links that are hit together.
-fn shared(group: &Group, common: Option<(usize, FaultName)>) -> Vec<Suspect> {
+fn shared(group: &DamageGroup, common: Option<(usize, FaultName)>) -> Vec<Suspect> {
     let spot = link_spot(group);
     let mut list = vec![Suspect {
         cause: FaultName::EmcNoise,
@@ -323,7 +326,7 @@ fn shared(group: &Group, common: Option<(usize, FaultName)>) -> Vec<Suspect> {
 }
 
 /// One link, or the last hop, by itself.
-fn single(input: &LocateInput<'_>, group: &Group) -> Vec<Suspect> {
+fn single(input: &LocateInput<'_>, group: &DamageGroup) -> Vec<Suspect> {
     let spot = link_spot(group);
     let hop = group.damages.first().map(|damage| damage.hop);
     let Some(hop) = hop.or_else(|| group.last_hop.as_ref().map(LastHop::hop)) else {
@@ -358,7 +361,7 @@ fn single(input: &LocateInput<'_>, group: &Group) -> Vec<Suspect> {
 }
 
 /// What is seen of one link; `is_both` if in both directions.
-fn symptom(input: &LocateInput<'_>, group: &Group, hop: Hop, is_both: bool) -> LinkSymptom {
+fn symptom(input: &LocateInput<'_>, group: &DamageGroup, hop: Hop, is_both: bool) -> LinkSymptom {
     let hits: u64 = group.damages.iter().map(|d| d.frames.max(d.symbols.unwrap_or(0))).sum::<u64>();
     let is_all_clean = !group.damages.is_empty() && group.damages.iter().all(is_clean);
     let at_card = [hop.from, hop.to].into_iter().any(|end| end.node().is_none());
@@ -426,7 +429,7 @@ fn add_earlier(list: &mut Vec<Suspect>, damage: &Damage) {
 }
 
 /// The link with the direction in which it damages frames.
-fn link_spot(group: &Group) -> CausePlace {
+fn link_spot(group: &DamageGroup) -> CausePlace {
     let hops = group.damages.iter().map(|damage| damage.hop);
     let mut all = hops.chain(group.last_hop.as_ref().map(LastHop::hop));
     let Some(first) = all.next() else { return CausePlace::Host };

@@ -6,6 +6,8 @@
 //! between: so only what a port had counted when all earlier ports were last read is compared
 //! (the *horizon*); what was counted later waits for the next reading.
 
+mod lost_beside;
+
 use linesman_proto::address::Path;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
@@ -66,6 +68,8 @@ pub enum LastHop {
         card: Path,
         /// How many frames were lost.
         lost: u64,
+        /// True if frames were damaged elsewhere, too, at other times.
+        is_beside: bool,
         /// When the first was missed.
         first: Instant,
         /// When the latest was missed.
@@ -88,11 +92,11 @@ impl Located {
     pub fn on(input: &LocateInput<'_>) -> Self {
         let mut located = Self::default();
         let mut nothing_counted = true;
-        let mut ends = Vec::new();
+        let (mut ends, mut beside) = (Vec::new(), Vec::new());
         for route in input.routes() {
             let mut walk = ErrorWalk {
                 input,
-                carried: Carried::default(),
+                carried: CountedBefore::default(),
                 horizon: Instant::MAX,
                 is_read: false,
             };
@@ -102,9 +106,10 @@ impl Located {
             if let Some(hop) = walk.unknown(route) {
                 located.last_hops.push(hop);
             }
+            beside.extend(walk.unknown_beside(route));
         }
         if !nothing_counted {
-            located.last_hops.clear();
+            located.last_hops = beside;
         }
         located.last_hops.extend(ends.into_iter().flatten());
         located
@@ -124,14 +129,14 @@ fn is_stuck(track: &CounterTrack) -> bool {
 
 /// Bad frames that earlier checks counted.
 #[derive(Clone, Copy, Default, Debug)]
-struct Carried {
+struct CountedBefore {
     frames: u64,
     is_lower_bound: bool,
 }
 
 struct ErrorWalk<'s, 'a> {
     input: &'s LocateInput<'a>,
-    carried: Carried,
+    carried: CountedBefore,
     /// What was counted up to then is in all readings walked by so far.
     horizon: Instant,
     /// Whether any check was read.
@@ -283,7 +288,12 @@ impl ErrorWalk<'_, '_> {
         } else {
             invalid.settled.saturating_sub(before.frames)
         };
-        let frames = frames.saturating_sub(invalid.excused);
+        // Noise of a link that comes and goes shows as symbols; without them a change cuts off a frame, no more.
+        let excused = match is_physical_read {
+            true => invalid.excused.min(physical.total + self.input.cut_off_at_most(hop.link)),
+            false => invalid.excused,
+        };
+        let frames = frames.saturating_sub(excused);
 
         // Some controllers make a symbol error anew when they send a bad frame on: then the symbols
         // go with the bad frames that came, one each.
@@ -334,7 +344,8 @@ impl ErrorWalk<'_, '_> {
             settled: total,
             total,
             excused: 0,
-            is_lower_bound: track.total.is_lower_bound(),
+            // One that stood at its end before the present errors has missed none of these.
+            is_lower_bound: total > 0 && track.total.is_lower_bound(),
         };
         for rise in self.input.rises(track) {
             let by = rise.difference.rise;
@@ -430,6 +441,7 @@ impl ErrorWalk<'_, '_> {
             hop,
             card,
             lost: lost.of_spell(),
+            is_beside: false,
             first,
             last,
         })

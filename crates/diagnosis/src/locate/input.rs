@@ -15,6 +15,9 @@ const SAME_EVENT: Span = Span::ms(500);
 /// Readings further apart than this say nothing of what fell together between them.
 const LONGEST_EVENT: Span = Span::s(5);
 
+/// Frames that a link cuts off when it goes and when it comes, both ways.
+const CUT_BY_CHANGE: u64 = 4;
+
 /// A controller whose counters were not read for this long no longer holds up a judgement.
 const STALE: Span = Span::s(10);
 
@@ -98,6 +101,21 @@ impl<'a> LocateInput<'a> {
             return false;
         }
         changes.iter().any(|(from, to)| *from <= rise.at && rise.after_time <= *to)
+    }
+
+    /// Most frames that the changes of a link may have cut off, on each side of each of them one or two.
+    #[must_use]
+    pub fn cut_off_at_most(&self, link: usize) -> u64 {
+        let ends = [self.tree.links()[link].upstream, self.tree.links()[link].downstream];
+        let of_end = |end: End| match end {
+            End::MainDevice(path) => self.model.host.card(path).carrier_changes,
+            End::Controller(node, port) => {
+                let device = &self.model.devices[node];
+                let lost = device.counters.rise(ErrorCounter::LostLink(port));
+                lost.saturating_add(device.dl.changes.len() as u64)
+            }
+        };
+        ends.into_iter().map(of_end).fold(1, u64::saturating_add).saturating_mul(CUT_BY_CHANGE)
     }
 
     /// Whether a device at either end of the link started anew between the two readings of a rise: its

@@ -14,6 +14,7 @@ pub mod damage;
 pub mod input;
 pub mod intervals;
 pub mod link_losses;
+pub mod probe_places;
 mod rhythm;
 
 pub use cause::{Suspect, Suspicion};

@@ -25,6 +25,13 @@ const KICKCAT_SOURCES: [MacAddress; 3] = [
     MacAddress([0x02, 0xCA, 0xCA, 0x0F, 0xFF, 0xFF]),
     MacAddress([0x02, 0xC0, 0xFF, 0xEE, 0x00, 0xFF]),
 ];
+/// True if a MainDevice sends from this address on every computer: it tells the program, and nobody's card.
+#[must_use]
+pub fn is_fixed_source(address: MacAddress) -> bool {
+    let fixed = KICKCAT_SOURCES.into_iter().chain([SOEM_SOURCE, ETHERCRAB_SOURCE]);
+    fixed.into_iter().any(|one| one.marked() == address.marked())
+}
+
 /// So many frames show how indexes are used.
 const MANY: u64 = 64;
 /// Counters that are read and cleared so often in turn are cleared as a habit.
@@ -32,19 +39,9 @@ const CLEARED_AGAIN: u64 = 2;
 
 /// A kind of MainDevice.
 #[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Default,
-    Debug,
-    Serialize,
-    Deserialize,
-    schemars::JsonSchema,
+    Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Debug, Serialize, Deserialize,
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum MainDeviceKind {
     /// SOEM, the Simple Open EtherCAT Master.
@@ -85,9 +82,8 @@ impl MainDeviceKind {
 }
 
 /// How sure the kind is.
-#[derive(
-    Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Certainty {
     /// No mark, or as many for another kind.

@@ -23,9 +23,8 @@ const EEPROM: core::ops::Range<u16> = 0x0500..0x0510;
 const FIRST_RAM: u16 = 0x1000;
 
 /// A way to access a register.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Access {
     /// Read from all at once, values ORed together: BRD.

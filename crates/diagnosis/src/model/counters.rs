@@ -278,6 +278,7 @@ impl CounterHistory {
     pub fn begin_spell(&mut self) {
         for track in self.tracks.values_mut() {
             track.before_spell = track.total.rise();
+            track.total.begin_anew();
         }
     }
 

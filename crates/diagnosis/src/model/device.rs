@@ -18,7 +18,7 @@ use linesman_proto::topology::SeenController;
 use super::mailbox::MailboxHistory;
 use super::{
     AlChange, AlError, AlHistory, ClockHistory, CounterHistory, Counting, DlHistory, ErrorSum,
-    Power, ReportedTrouble, Seen, SiiImage, push_kept,
+    Power, ReportedTrouble, Seen, SetUp, SiiImage, push_kept,
 };
 
 /// A state that was lost is read so long after what it was lost by, at most.
@@ -94,6 +94,8 @@ pub struct Device {
     pub sync_counts: BTreeMap<(u16, u8), Seen<u16>>,
     /// Its FMMUs, as they were set up.
     pub fmmus: BTreeMap<u8, FmmuConfig>,
+    /// Its SyncManagers and its clock, as they were set up.
+    pub set_up: SetUp,
     /// What was seen of its SII.
     pub sii: SiiImage,
     /// What that says of the E-bus.
@@ -290,6 +292,7 @@ impl Device {
             clock: ClockHistory::default(),
             sync_counts: BTreeMap::new(),
             fmmus: BTreeMap::new(),
+            set_up: SetUp::default(),
             sii: SiiImage::default(),
             power: None,
         }

@@ -11,14 +11,17 @@ pub mod cyclic;
 pub mod device;
 pub mod dl_history;
 pub mod event_field;
+mod expected_wkc;
 pub mod host;
 pub mod input_activity;
 pub mod learn;
 pub mod mailbox;
 pub mod path_delay;
+pub mod probe_record;
 pub mod reported;
 pub mod round_trip;
 pub mod search;
+pub mod set_up;
 pub mod sii_image;
 pub mod traffic;
 pub mod working_counter;
@@ -47,9 +50,11 @@ pub use event_field::{EventField, EventTrack};
 pub use host::{CardHistory, HostHistory, Tally};
 pub use learn::Learner;
 pub use path_delay::{PathDelayStep, PathDelays};
+pub use probe_record::ProbeRecord;
 pub use reported::{Counting, ErrorSum, Reported, ReportedTrouble};
 pub use round_trip::RoundTripTimes;
 pub use search::LoopWrite;
+pub use set_up::{ClockSetUp, SetUp};
 pub use sii_image::{Power, SiiImage};
 pub use traffic::{Silence, Traffic};
 pub use working_counter::{Deficit, Ordered, WorkingCounterHistory};
@@ -96,6 +101,8 @@ const ORDER_IN_FLIGHT: Span = Span::ms(2);
 
 /// Errors that come after so long a time without any are a new spell.
 pub const SPELL_GAP: Span = Span::s(2);
+/// Errors after so long a time are a new spell even where some counters were not read in between.
+pub const SPELL_GAP_MOST: Span = Span::s(10);
 
 /// A network as far as it is known.
 #[derive(Clone, Debug, Default)]
@@ -129,6 +136,8 @@ pub struct NetworkModel {
     /// Station addresses that were asked without any answer, and that no SubDevice was seen to have: in the order of
     /// the first request, some dozens at most.
     pub asked_in_vain: Vec<StationAddress>,
+    /// Record of a capture probe on links.
+    pub capture_probe: ProbeRecord,
     /// What another program says of the line.
     pub reported: Reported,
     /// The time of the latest frame or observation.
@@ -213,7 +222,10 @@ impl NetworkModel {
     ///
     /// After a time without any, they are a new spell: trouble of its own, whatever was counted before.
     pub fn note_errors(&mut self, since: Instant, at: Instant) {
-        if self.last_errors.is_some_and(|last| since > last + SPELL_GAP) {
+        let is_new = |last: Instant| {
+            since > last + SPELL_GAP && (since > last + SPELL_GAP_MOST || self.is_read_since(last))
+        };
+        if self.last_errors.is_some_and(is_new) {
             self.spell_began = since;
             for device in &mut self.devices {
                 device.counters.begin_spell();
@@ -222,6 +234,15 @@ impl NetworkModel {
             self.traffic.losses.begin_spell();
         }
         self.last_errors = self.last_errors.max(Some(at));
+    }
+
+    /// True if the counters of all who are read have been read after `last`: until then it is not known which of them
+    /// had a part in the errors of that time.
+    fn is_read_since(&self, last: Instant) -> bool {
+        self.devices.iter().filter(|device| device.silent.is_none()).all(|device| {
+            let read = device.counters.tracks().map(|(_, track)| track.last.at).max();
+            read.is_none_or(|at| at > last)
+        })
     }
 
     /// Whether a request that was sent at `at` may be lost because the MainDevice opened or closed ports.
@@ -357,8 +378,15 @@ impl NetworkModel {
             return false;
         }
         self.tree_basis = basis;
-        let seen: Vec<_> = self.devices.iter().map(Device::as_first_seen).collect();
-        let tree = Reconstruction::of(Path::A, &seen).tree;
+        let mut seen: Vec<_> = self.devices.iter().map(Device::as_first_seen).collect();
+        let mut tree = Reconstruction::of(Path::A, &seen).tree;
+        // Behind an open port may be SubDevices that frames reach only behind a probe inside the line: no ring.
+        if self.capture_probe.inside().is_some()
+            && let Some((node, port)) = tree.closes_at()
+        {
+            seen[node].open[port] = false;
+            tree = Reconstruction::of(Path::A, &seen).tree;
+        }
         let is_new = self.tree.as_ref() != Some(&tree);
         self.tree = Some(tree);
         is_new

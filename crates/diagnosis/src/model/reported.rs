@@ -10,6 +10,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::AlStatus;
 use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
 
 use super::{Seen, Tally};
 use crate::main_device::MainDeviceKind;
@@ -96,6 +97,8 @@ pub enum Part {
 pub enum ExchangePlace {
     /// A link, by its index in the tree.
     Link(usize),
+    /// A link, by its ends.
+    Ends(End<DeviceId>, End<DeviceId>),
     /// A SubDevice.
     Device(DeviceId),
     /// The computer.

@@ -59,6 +59,20 @@ impl SiiImage {
         known.then_some(u16::from_le_bytes(bytes))
     }
 
+    /// Stretches of words that were read: the address of the first word, and the words.
+    #[must_use]
+    pub fn stretches(&self) -> Vec<(u32, Vec<u16>)> {
+        let mut all: Vec<(u32, Vec<u16>)> = Vec::new();
+        for at in (0..self.known.len() as u32).filter(|at| self.known[*at as usize]) {
+            let Some(word) = self.word(WordAddress(at)) else { continue };
+            match all.last_mut() {
+                Some((first, words)) if *first + words.len() as u32 == at => words.push(word),
+                Some(_) | None => all.push((at, vec![word])),
+            }
+        }
+        all
+    }
+
     /// Two words, the low one first, if both were read.
     #[must_use]
     pub fn long(&self, at: WordAddress) -> Option<u32> {

@@ -12,19 +12,19 @@ pub const DEFICITS_KEPT: usize = 16;
 /// A stretch of time in which a working counter was too low.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Deficit {
-    /// What was expected.
+    /// Expected working counter.
     pub expected: u16,
     /// The first working counter that was too low.
     pub first: Seen<u16>,
     /// The lowest one.
     pub lowest: u16,
-    /// How many datagrams came back so.
+    /// Number of datagrams that came back with it.
     pub count: u64,
     /// When it was right again.
     pub ended: Option<Instant>,
 }
 
-/// Whether the MainDevice has taken SubDevices out of the states in which they exchange process data.
+/// Knowledge of orders by which the MainDevice takes SubDevices out of the states in which they exchange process data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Ordered {
     /// It has.
@@ -45,7 +45,7 @@ pub struct WorkingCounterHistory {
     planned: Option<u16>,
     deficits: VecDeque<Deficit>,
     may_be_ordered: Option<Seen<u16>>,
-    /// Whether the process data were laid out anew since it last came back: the next working counter is the
+    /// True if the process data were laid out anew since it last came back: the next working counter is the
     /// first of the new layout.
     is_laid_out_anew: bool,
 }
@@ -175,7 +175,7 @@ impl WorkingCounterHistory {
 
     // ---- what rules ask ----
 
-    /// How often the datagram came back.
+    /// Number of times that the datagram came back.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
@@ -200,19 +200,19 @@ impl WorkingCounterHistory {
         self.highest
     }
 
-    /// Whether it was higher than the first time, since the process data were set up.
+    /// True if it was higher than the first time, since the process data were set up.
     #[must_use]
     pub const fn has_risen(&self) -> bool {
         self.highest.value > self.first.value
     }
 
-    /// Whether a working counter was planned for the datagram, and was reached.
+    /// True if a working counter was planned for the datagram, and was reached.
     #[must_use]
     pub fn is_as_planned(&self) -> bool {
         self.planned.is_some_and(|planned| self.highest.value >= planned)
     }
 
-    /// Whether a working counter was planned for the datagram, and was not reached.
+    /// True if a working counter was planned for the datagram, and was not reached.
     #[must_use]
     pub fn is_below_plan(&self) -> bool {
         self.planned.is_some_and(|planned| self.highest.value < planned)
@@ -224,7 +224,7 @@ impl WorkingCounterHistory {
         &self.deficits
     }
 
-    /// Whether it is too low now.
+    /// True if it is too low now.
     #[must_use]
     pub fn has_deficit(&self) -> bool {
         self.deficits.back().is_some_and(|deficit| deficit.ended.is_none())
@@ -238,7 +238,7 @@ impl WorkingCounterHistory {
         (first.first == self.first).then_some(first)
     }
 
-    /// Whether it has fallen, since the process data were set up, where that may have been ordered without anybody having
+    /// True if it has fallen, since the process data were set up, where that may have been ordered without anybody having
     /// seen it.
     #[must_use]
     pub fn may_be_ordered(&self) -> bool {

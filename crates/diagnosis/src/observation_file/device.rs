@@ -10,12 +10,13 @@ use super::value::{Count, Word};
 use crate::model::Counting;
 
 /// A SubDevice as somebody read it.
-#[derive(Clone, PartialEq, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedDevice {
     /// Its number, from 1; the place in the file unless said.
     #[serde(default)]
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub no: Option<u32>,
     /// Unique name; its number unless said.
     #[serde(default)]
@@ -27,7 +28,7 @@ pub struct ObservedDevice {
     pub on: Attachment,
     /// The port by which it is entered, `A` unless said.
     #[serde(default = "port_a")]
-    #[schemars(regex(pattern = "^[A-D]$"))]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^[A-D]$")))]
     pub entry: String,
     /// Station address.
     #[serde(default)]
@@ -83,7 +84,8 @@ pub struct ObservedDevice {
 }
 
 /// A type of controller, by how it counts errors.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum ControllerName {
     /// An ASIC of any type: counts frames apart that were bad already.
     #[serde(rename = "asic", alias = "ASIC")]
@@ -123,9 +125,10 @@ impl ControllerName {
 }
 
 /// The four ports, as they are or as they were.
-#[derive(Clone, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, rename_all = "UPPERCASE", bound = "T: Deserialize<'de>")]
-#[schemars(rename = "{T}s")]
+#[cfg_attr(feature = "schema", schemars(rename = "{T}s"))]
 pub struct Ports<T> {
     /// Port A, number 0.
     #[serde(default)]
@@ -169,7 +172,8 @@ impl<T: Clone> Ports<T> {
 }
 
 /// A port as somebody read it.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedPort {
     /// Whether it has a link.
@@ -205,7 +209,8 @@ pub struct ObservedPort {
 }
 
 /// Earlier values of a SubDevice.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EarlierDevice {
     /// Of its ports.
@@ -220,7 +225,8 @@ pub struct EarlierDevice {
 }
 
 /// Earlier values of a port's counters.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EarlierPort {
     /// RX error register.

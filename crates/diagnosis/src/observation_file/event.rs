@@ -5,7 +5,8 @@ use serde::Deserialize;
 use super::value::{Address, Date, Word};
 
 /// An emergency of a SubDevice.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedEmergency {
     /// Whose: name or number.
@@ -27,7 +28,8 @@ pub struct ObservedEmergency {
 }
 
 /// A request to a SubDevice's object dictionary that it refused.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedAbort {
     /// Whose: name or number.
@@ -48,7 +50,8 @@ pub struct ObservedAbort {
 }
 
 /// A part that was exchanged to find a fault, between two readings or before the last.
-#[derive(Clone, PartialEq, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedExchange {
     /// What was exchanged.
@@ -64,7 +67,8 @@ pub struct ObservedExchange {
 }
 
 /// A part that can be exchanged.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum ExchangedPart {
     /// A cable with its plugs.

@@ -5,7 +5,8 @@ use serde::Deserialize;
 use super::value::Count;
 
 /// What the MainDevice counted. Left out: not known.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedMainDevice {
     /// Whether the card has a link.

@@ -44,7 +44,8 @@ use crate::report::Diagnosis;
 use place::Lines;
 
 /// An observation file.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservationFile {
     /// What it is about.

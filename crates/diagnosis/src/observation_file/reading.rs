@@ -9,7 +9,8 @@ use super::working_counter::ObservedWorkingCounter;
 use linesman_proto::port::Port;
 
 /// A further reading of the same line. What it does not give was not read then.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Reading {
     /// When, by the clock on the wall, such as `2026-11-20T10:00:00`.
@@ -30,12 +31,13 @@ pub struct Reading {
 }
 
 /// What a reading has of a SubDevice.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ReadDevice {
     /// Its number, instead of its name.
     #[serde(default)]
-    #[schemars(range(min = 1))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub no: Option<u32>,
     /// Its name.
     #[serde(default)]
@@ -70,7 +72,8 @@ pub struct ReadDevice {
 }
 
 /// What a reading has of a port.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ReadPort {
     /// Whether it has a link.

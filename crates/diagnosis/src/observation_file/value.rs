@@ -92,6 +92,7 @@ macro_rules! read_as_number {
                 }
             }
 
+            #[cfg(feature = "schema")]
             impl schemars::JsonSchema for $name {
                 fn schema_name() -> std::borrow::Cow<'static, str> {
                     stringify!($name).into()
@@ -148,13 +149,13 @@ impl<'de> Deserialize<'de> for Date {
         /// Both forms that a file may have.
         #[derive(Deserialize)]
         #[serde(untagged)]
-        enum Form {
+        enum FileForm {
             Toml(toml::value::Datetime),
             Text(String),
         }
-        let text = match Form::deserialize(deserializer) {
-            Ok(Form::Toml(date)) => date.to_string(),
-            Ok(Form::Text(text)) => text,
+        let text = match FileForm::deserialize(deserializer) {
+            Ok(FileForm::Toml(date)) => date.to_string(),
+            Ok(FileForm::Text(text)) => text,
             Err(_) => return Err(de::Error::custom(DATE_EXPECTED)),
         };
         let wrong = || de::Error::custom(format!("`{text}` is no date with time: {DATE_EXPECTED}"));
@@ -164,6 +165,7 @@ impl<'de> Deserialize<'de> for Date {
 
 const DATE_EXPECTED: &str = "expected a date with time such as \"2026-11-20T10:00:00\"";
 
+#[cfg(feature = "schema")]
 impl schemars::JsonSchema for Date {
     fn schema_name() -> std::borrow::Cow<'static, str> {
         "Date".into()

@@ -6,7 +6,8 @@ use serde::Deserialize;
 use super::value::{Address, Count};
 
 /// A datagram of process data with its working counter.
-#[derive(Clone, PartialEq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ObservedWorkingCounter {
     /// Its sync unit, domain or task; the place in the file unless said.
@@ -42,7 +43,8 @@ pub struct ObservedWorkingCounter {
 }
 
 /// A command to logical addresses.
-#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub enum LogicalCommand {
     /// Reads.
     #[serde(rename = "LRD", alias = "lrd")]

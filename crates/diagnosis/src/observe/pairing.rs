@@ -14,6 +14,7 @@
 
 mod loss;
 mod one_way;
+mod request_copy;
 mod returned;
 mod sent_by;
 
@@ -62,7 +63,7 @@ pub enum PairingOutcome {
 /// Requests that wait for their return.
 #[derive(Clone, Default, Debug)]
 pub struct Pairing {
-    pending: VecDeque<Pending>,
+    pending: VecDeque<PendingRequest>,
     spare: Vec<Vec<u8>>,
     spare_sums: Vec<Vec<u16>>,
     returned: [Option<(Fingerprint, Instant)>; REMEMBERED],
@@ -87,7 +88,7 @@ pub struct Pairing {
 }
 
 #[derive(Clone, Debug)]
-struct Pending {
+struct PendingRequest {
     print: Fingerprint,
     bytes: Vec<u8>,
     time: Instant,
@@ -112,7 +113,7 @@ struct Pending {
     sums: Vec<u16>,
 }
 
-impl Pending {
+impl PendingRequest {
     fn copy(&self) -> FrameCopy<'_> {
         FrameCopy { bytes: &self.bytes, time: self.time, number: self.number, path: self.path }
     }
@@ -131,7 +132,7 @@ impl Pairing {
         let is_unknown = frame.direction == Direction::Unknown;
         // In a recording of returns alone the copy that card B sent looks like a request; what card A sent is no
         // answer to it.
-        let is_others = |pending: &Pending| {
+        let is_others = |pending: &PendingRequest| {
             is_unknown
                 && source.is_marked()
                 && !pending.source.is_marked()
@@ -139,8 +140,9 @@ impl Pairing {
                 && pending.source.marked() != source
         };
         // Indexes are used again: of several that fit, one that others overtook is lost.
-        let fits =
-            |pending: &Pending| pending.print.lasting == print.lasting && !is_others(pending);
+        let fits = |pending: &PendingRequest| {
+            pending.print.lasting == print.lasting && !is_others(pending)
+        };
         let fitting = self.pending.iter().enumerate().filter(|(_, pending)| fits(pending));
         let found = fitting.min_by_key(|(_, pending)| pending.overtaken).map(|(index, pending)| {
             // Who asks the same again long after has given the first one up.
@@ -212,8 +214,8 @@ impl Pairing {
         self.pending.front().filter(|oldest| oldest.is_live).map(|oldest| oldest.time + TIMEOUT)
     }
 
-    /// Settles all requests that are still out: the input has ended.
-    pub fn finish(&mut self, settle: &mut impl FnMut(&Exchange<'_>)) {
+    /// Settles all requests that are still out: the input has ended at `now`.
+    pub fn finish(&mut self, now: Instant, settle: &mut impl FnMut(&Exchange<'_>)) {
         // An input that stops between requests and their returns loses nothing.
         let waiting = || self.pending.iter().filter(|pending| pending.overtaken == 0);
         let is_short = match (waiting().next(), waiting().next_back()) {
@@ -221,7 +223,9 @@ impl Pairing {
             (None, _) | (_, None) => true,
         };
         let is_few = waiting().count() <= MOST_IN_FLIGHT;
-        let may_return = self.returns > 0 && is_short && is_few;
+        // Who listened on for so long would have seen them.
+        let is_late = waiting().next_back().is_some_and(|last| gap(last.time, now) >= TIMEOUT);
+        let may_return = self.returns > 0 && is_short && is_few && !is_late;
         while let Some(oldest) = self.pending.front() {
             let is_cut_off = may_return && oldest.overtaken == 0;
             self.lose(0, is_cut_off, settle);
@@ -284,36 +288,10 @@ impl Pairing {
         print: Fingerprint,
         settle: &mut impl FnMut(&Exchange<'_>),
     ) -> PairingOutcome {
-        if let Some(path) = frame.path
-            && let Some(pending) = self.pending.iter_mut().rev().find(|pending| {
-                pending.print == print
-                    && !pending.sent[path.index()]
-                    && gap(pending.time, frame.time) <= OTHER_CARD
-            })
-        {
-            pending.sent[path.index()] = true;
-            pending.copy_by = Some(source);
-            pending.out += 1;
+        if self.take_copy(frame, source, is_repeated, print) {
             return PairingOutcome::RequestCopy;
         }
-        let is_unknown_card = frame.path.is_none();
-        let is_other_card = |pending: &&mut Pending| {
-            pending.print == print
-                && pending.copy_by.is_none()
-                && pending.source != source
-                && gap(pending.time, frame.time) <= OTHER_CARD
-        };
-        if frame.path.is_none()
-            && is_repeated
-            && let Some(pending) = self.pending.iter_mut().rev().find(is_other_card)
-        {
-            pending.copy_by = Some(source);
-            pending.out += 1;
-            self.other_card = Some(source);
-            self.senders.note(frame, source, is_repeated);
-            return PairingOutcome::RequestCopy;
-        }
-        let was_recorded = |pending: &Pending| {
+        let was_recorded = |pending: &PendingRequest| {
             pending.print == print
                 && pending.path == frame.path
                 && gap(pending.time, frame.time) <= RECORDED_TWICE
@@ -326,25 +304,25 @@ impl Pairing {
             return PairingOutcome::Duplicate;
         }
         // For the two cards of a ring some commands are replaced by NOP, now in the one copy, now in the other.
-        let is_twin = |pending: &Pending| {
+        let is_twin = |pending: &PendingRequest| {
             pending.print.skeleton == print.skeleton
                 && pending.source.marked() != source.marked()
                 && gap(pending.time, frame.time) <= OTHER_CARD
         };
         let is_repeated =
-            is_repeated || (is_unknown_card && self.pending.iter().rev().take(8).any(is_twin));
+            is_repeated || (frame.path.is_none() && self.pending.iter().rev().take(8).any(is_twin));
         self.senders.note(frame, source, is_repeated);
         if frame.direction == Direction::Unknown && !is_repeated {
             self.unrecorded += self.senders.number(source, &print);
         }
-        let is_by_other_card = |pending: &Pending| {
+        let is_by_other_card = |pending: &PendingRequest| {
             pending.print.skeleton == print.skeleton
                 && (pending.source, pending.path) != (source, frame.path)
                 && gap(pending.time, frame.time) <= OTHER_CARD
         };
         // What the second card alone asks goes round a whole ring untouched: it is only to see which way it comes back.
         let is_second_card = frame.path == Some(Path::B) || self.other_card == Some(source);
-        let is_less = |pending: &Pending| {
+        let is_less = |pending: &PendingRequest| {
             let (its, own) = (pending.print.commands, print.commands);
             is_by_other_card(pending) && (its > own || (is_second_card && its < own))
         };
@@ -359,7 +337,7 @@ impl Pairing {
         sums.clear();
         let mut sent = [false; 2];
         sent[frame.path.unwrap_or_default().index()] = true;
-        self.pending.push_back(Pending {
+        self.pending.push_back(PendingRequest {
             print,
             bytes,
             time: frame.time,
@@ -497,6 +475,7 @@ mod tests {
                     number: cycle,
                     fcs: None,
                     truncated: false,
+                    probe: None,
                     bytes: &frame.0,
                 };
                 let view = frame.view();

@@ -1,6 +1,7 @@
 //! One frame as it was seen, and one observation of the host.
 
 use linesman_proto::address::{Network, Path};
+use linesman_proto::esl::EslRecord;
 use linesman_proto::time::{Instant, Span};
 
 /// Which way a frame went past the observer.
@@ -31,6 +32,8 @@ pub struct FrameSeen<'a> {
     pub fcs: Option<bool>,
     /// Whether bytes at its end were not recorded.
     pub truncated: bool,
+    /// Record that a capture probe on a link has added, where the frame was recorded by one.
+    pub probe: Option<EslRecord>,
     /// The frame from its destination address on, without check sequence.
     pub bytes: &'a [u8],
 }

@@ -18,7 +18,7 @@ const START_S: f64 = 1.5;
 const START_LINES: usize = 4;
 
 /// A line of the log.
-struct Entry<'l> {
+struct KernelEntry<'l> {
     stamp: Option<Stamp>,
     from: MessageSource,
     text: &'l str,
@@ -39,7 +39,7 @@ enum MessageSource {
     Other,
 }
 
-fn entry<'l>(line: &'l Line<'_>) -> Option<Entry<'l>> {
+fn entry<'l>(line: &'l Line<'_>) -> Option<KernelEntry<'l>> {
     let (stamp, rest) = at_begin(&line.text);
     // Between time and message stand host and program.
     let found = rest.match_indices("EtherCAT").find_map(|(at, _)| sender(&rest[at..]));
@@ -53,7 +53,7 @@ fn entry<'l>(line: &'l Line<'_>) -> Option<Entry<'l>> {
         }
         None => return None,
     };
-    Some(Entry { stamp, from, text: text.trim() })
+    Some(KernelEntry { stamp, from, text: text.trim() })
 }
 
 /// `EtherCAT ERROR 0-3: …`, `EtherCAT WARNING 0: …`, `EtherCAT 0-main-3: …`, `EtherCAT: …`.
@@ -95,7 +95,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     let mut block = Block::new(Format::KernelLog);
     let (end, unused) = super::fact::extent(lines, |line| entry(line).is_some());
     (block.lines, block.unused) = (end, unused);
-    let entries: Vec<Entry<'_>> = lines[..end].iter().filter_map(entry).collect();
+    let entries: Vec<KernelEntry<'_>> = lines[..end].iter().filter_map(entry).collect();
     let mut reader = LogReader::of(&entries);
     for (at, entry) in entries.iter().enumerate() {
         reader.read(at, entry);
@@ -139,7 +139,7 @@ pub(super) fn foreign(lines: &[Line<'_>]) -> usize {
 }
 
 struct LogReader<'e> {
-    entries: &'e [Entry<'e>],
+    entries: &'e [KernelEntry<'e>],
     master: Option<u64>,
     facts: Vec<Fact>,
     /// The latest line that tells of a start, and where it stood.
@@ -156,7 +156,7 @@ struct LogReader<'e> {
 }
 
 impl<'e> LogReader<'e> {
-    fn of(entries: &'e [Entry<'e>]) -> Self {
+    fn of(entries: &'e [KernelEntry<'e>]) -> Self {
         let master = entries.iter().find_map(|one| match one.from {
             MessageSource::Master(master) | MessageSource::Device(master, _) => Some(master),
             MessageSource::Module | MessageSource::Card | MessageSource::Other => None,
@@ -202,7 +202,7 @@ impl<'e> LogReader<'e> {
         }
     }
 
-    fn read(&mut self, at: usize, entry: &Entry<'_>) {
+    fn read(&mut self, at: usize, entry: &KernelEntry<'_>) {
         if self.is_of_another(entry.from) {
             return;
         }
@@ -215,7 +215,7 @@ impl<'e> LogReader<'e> {
         }
     }
 
-    fn read_master(&mut self, at: usize, entry: &Entry<'_>) {
+    fn read_master(&mut self, at: usize, entry: &KernelEntry<'_>) {
         let stamp = entry.stamp;
         if let Some(up) = message::link(entry.text) {
             if up {
@@ -251,7 +251,7 @@ impl<'e> LogReader<'e> {
         }
     }
 
-    fn read_device(&mut self, position: u16, entry: &Entry<'_>) {
+    fn read_device(&mut self, position: u16, entry: &KernelEntry<'_>) {
         let whom = SubDeviceRef::Position(position);
         if let Some((index, subindex)) = message::refused_request(entry.text) {
             self.refused = Some((position, index, subindex));

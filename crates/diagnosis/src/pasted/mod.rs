@@ -42,7 +42,8 @@ pub struct Pasted {
 }
 
 /// What was understood of a pasted text, and what not.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Understood {
     /// What was understood, in the order of the text.
@@ -56,7 +57,8 @@ pub struct Understood {
 }
 
 /// A stretch of text that was understood.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct UnderstoodBlock {
     /// What it is.
@@ -68,7 +70,8 @@ pub struct UnderstoodBlock {
 }
 
 /// A line that was not understood.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct IgnoredLine {
     /// Its number, from 1.

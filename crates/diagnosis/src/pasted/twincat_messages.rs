@@ -13,7 +13,7 @@ use super::twincat_online::address_in;
 use crate::observation_file::{Count, ObservedMainDevice, ReadDevice, Word};
 
 /// A message with whom it is about.
-struct Message<'l> {
+struct TwinCatMessage<'l> {
     stamp: Option<Stamp>,
     whom: SubDeviceRef,
     /// Where it is about a stretch: the last of it.
@@ -50,7 +50,7 @@ fn stamp_of(line: &str, before: &str) -> Option<Stamp> {
     by_cell.or_else(by_words).map(Stamp::Date)
 }
 
-fn message<'l>(line: &'l str) -> Option<Message<'l>> {
+fn message<'l>(line: &'l str) -> Option<TwinCatMessage<'l>> {
     // The first quoted name with an address behind it.
     let found = line.match_indices('\'').find_map(|(at, _)| {
         let (whom, rest) = subject(&line[at..])?;
@@ -63,22 +63,17 @@ fn message<'l>(line: &'l str) -> Option<Message<'l>> {
     if let Some((to, after)) = range {
         (last, rest) = (Some(to), after);
     }
-    Some(Message { stamp, whom, last, text: rest.trim_start_matches([':', ' ']).trim() })
+    Some(TwinCatMessage { stamp, whom, last, text: rest.trim_start_matches([':', ' ']).trim() })
 }
 
 /// What a message tells; `None` when it is none of those that carry a fact.
 fn facts(
-    message: &Message<'_>,
+    message: &TwinCatMessage<'_>,
     changes: &mut BTreeMap<SubDeviceRef, u64>,
 ) -> Option<Vec<FactKind>> {
     let text = message.text;
     let whom = || message.whom.clone();
     let lower = text.to_ascii_lowercase();
-    let quoted = |after: &str| -> Option<String> {
-        let at = lower.find(after)? + after.len();
-        let state = between(&text[at..], "'", "'")?;
-        state_word::read(state)?.state
-    };
     let read = |read: ReadDevice| FactKind::Read(whom(), Box::new(read));
     if lower.contains("communication interrupted") || lower.contains("communication re-established")
     {
@@ -87,26 +82,13 @@ fn facts(
         return Some(vec![FactKind::Interrupted { from: whom(), to, is_back }]);
     }
     if lower.contains("abnormal state change") {
-        let (from, to) = (quoted("from")?, quoted("to '").or_else(|| quoted(" to"))?);
-        let code = lower.split_once("code").and_then(|(_, code)| {
-            hex(code.split(['.', ' ', ')', '-']).find(|word| !word.is_empty())?)
-        });
-        let code = code.and_then(|code| u16::try_from(code).ok()).filter(|code| *code != 0);
-        let before = read(ReadDevice { state: Some(from), ..ReadDevice::default() });
-        let count = changes.entry(whom()).or_default();
-        *count += 1;
-        let then = match code {
-            Some(code) => ReadDevice {
-                state: Some(format!("ERR {to}")),
-                al_code: Some(Word(code)),
-                ..ReadDevice::default()
-            },
-            None => ReadDevice { state_changes: Some(Count(*count)), ..ReadDevice::default() },
-        };
-        return Some(vec![before, read(then)]);
+        let count = changes.get(&message.whom).copied().unwrap_or_default() + 1;
+        let [before, then] = abnormal_change(text, &lower, count)?;
+        changes.insert(whom(), count);
+        return Some(vec![read(before), read(then)]);
     }
     if lower.contains("state change aborted") {
-        let back = quoted("back to");
+        let back = quoted_state(text, &lower, "back to");
         let failed =
             ReadDevice { state: back, configuration_failed: Some(true), ..ReadDevice::default() };
         return Some(vec![read(failed)]);
@@ -125,34 +107,70 @@ fn facts(
         })]);
     }
     if let Some((_, rest)) = text.split_once("SDO Abort") {
-        let object =
-            text.split_whitespace().find_map(|word| word.trim_end_matches(')').split_once(':'));
-        let (index, subindex) = object?;
-        let code =
-            rest.split([',', ' ', '(', ')']).filter(|word| word.starts_with("0x")).find_map(hex)?;
-        return Some(vec![FactKind::Abort {
-            whom: whom(),
-            index: u16::try_from(hex(index)?).ok()?,
-            subindex: u8::try_from(hex(subindex)?).ok()?,
-            code: u32::try_from(code).ok()?,
-        }]);
+        return Some(vec![sdo_abort(whom(), text, rest)?]);
     }
     if lower.contains("emergency") {
-        // `CoE - Emergency (Hex: 8611, 08, '29 00 00 00 00')`
-        let inside = text.split_once("Hex:").map_or(text, |(_, inside)| inside);
-        let mut numbers = inside
-            .split(|one: char| !one.is_ascii_hexdigit() && one != 'x')
-            .filter(|part| !part.is_empty());
-        let code = numbers.find(|part| part.trim_start_matches("0x").len() == 4).and_then(hex)?;
-        let rest: Vec<u8> = numbers.filter_map(|part| u8::try_from(hex(part)?).ok()).collect();
-        return Some(vec![FactKind::Emergency {
-            whom: whom(),
-            code: u16::try_from(code).ok()?,
-            register: rest.first().copied(),
-            data: rest.get(1..).unwrap_or_default().iter().copied().take(5).collect(),
-        }]);
+        return Some(vec![emergency(whom(), text)?]);
     }
     None
+}
+
+/// The state in quotation marks after a word; `lower` is the text in small letters.
+fn quoted_state(text: &str, lower: &str, after: &str) -> Option<String> {
+    let at = lower.find(after)? + after.len();
+    let state = between(&text[at..], "'", "'")?;
+    state_word::read(state)?.state
+}
+
+/// The readings before and after the abnormal change of a state, the `count`th of that SubDevice.
+fn abnormal_change(text: &str, lower: &str, count: u64) -> Option<[ReadDevice; 2]> {
+    let quoted = |after| quoted_state(text, lower, after);
+    let (from, to) = (quoted("from")?, quoted("to '").or_else(|| quoted(" to"))?);
+    let code = lower.split_once("code").and_then(|(_, code)| {
+        hex(code.split(['.', ' ', ')', '-']).find(|word| !word.is_empty())?)
+    });
+    let code = code.and_then(|code| u16::try_from(code).ok()).filter(|code| *code != 0);
+    let before = ReadDevice { state: Some(from), ..ReadDevice::default() };
+    let then = match code {
+        Some(code) => ReadDevice {
+            state: Some(format!("ERR {to}")),
+            al_code: Some(Word(code)),
+            ..ReadDevice::default()
+        },
+        None => ReadDevice { state_changes: Some(Count(count)), ..ReadDevice::default() },
+    };
+    Some([before, then])
+}
+
+/// The refusal of an object; `rest` is what stands behind the words `SDO Abort`.
+fn sdo_abort(whom: SubDeviceRef, text: &str, rest: &str) -> Option<FactKind> {
+    let object =
+        text.split_whitespace().find_map(|word| word.trim_end_matches(')').split_once(':'));
+    let (index, subindex) = object?;
+    let code =
+        rest.split([',', ' ', '(', ')']).filter(|word| word.starts_with("0x")).find_map(hex)?;
+    Some(FactKind::Abort {
+        whom,
+        index: u16::try_from(hex(index)?).ok()?,
+        subindex: u8::try_from(hex(subindex)?).ok()?,
+        code: u32::try_from(code).ok()?,
+    })
+}
+
+/// `CoE - Emergency (Hex: 8611, 08, '29 00 00 00 00')`.
+fn emergency(whom: SubDeviceRef, text: &str) -> Option<FactKind> {
+    let inside = text.split_once("Hex:").map_or(text, |(_, inside)| inside);
+    let mut numbers = inside
+        .split(|one: char| !one.is_ascii_hexdigit() && one != 'x')
+        .filter(|part| !part.is_empty());
+    let code = numbers.find(|part| part.trim_start_matches("0x").len() == 4).and_then(hex)?;
+    let rest: Vec<u8> = numbers.filter_map(|part| u8::try_from(hex(part)?).ok()).collect();
+    Some(FactKind::Emergency {
+        whom,
+        code: u16::try_from(code).ok()?,
+        register: rest.first().copied(),
+        data: rest.get(1..).unwrap_or_default().iter().copied().take(5).collect(),
+    })
 }
 
 /// `Frame missed 10 times (frame no. 0)`.

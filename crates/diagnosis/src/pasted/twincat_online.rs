@@ -89,7 +89,7 @@ fn header(line: &str) -> Option<Vec<OnlineColumn>> {
 
 /// A row of the list.
 #[derive(Clone, PartialEq, Default, Debug)]
-struct Row {
+struct OnlineRow {
     no: Option<u16>,
     address: Option<u16>,
     name: String,
@@ -110,12 +110,12 @@ fn number_in(name: &str) -> Option<u16> {
     rest.trim().parse().ok()
 }
 
-fn row_by(columns: &[OnlineColumn], line: &str) -> Option<Row> {
+fn row_by(columns: &[OnlineColumn], line: &str) -> Option<OnlineRow> {
     let cells = cells(line);
     if cells.len() < 2 {
         return None;
     }
-    let mut row = Row::default();
+    let mut row = OnlineRow::default();
     let mut cells = cells.into_iter();
     let mut has_value = false;
     for (at, column) in columns.iter().enumerate() {
@@ -164,7 +164,7 @@ fn row_by(columns: &[OnlineColumn], line: &str) -> Option<Row> {
 }
 
 /// A row without a header: number, address, name, state, errors, a blank or more apart.
-fn plain_row(line: &str) -> Option<Row> {
+fn plain_row(line: &str) -> Option<OnlineRow> {
     let cells = cells(line);
     let words: Vec<&str> = match cells.len() {
         4.. => {
@@ -195,14 +195,14 @@ fn plain_row(line: &str) -> Option<Row> {
         .rev()
         .find_map(|end| Some((end, state_word::read(&rest[at..end].join(" "))?)))?;
     let (crc, is_whole) = crc(&rest[end..].join(" ")).unwrap_or_default();
-    Some(Row {
+    Some(OnlineRow {
         no: Some(no),
         address: Some(address),
         name: rest[..at].join(" "),
         state: Some(state),
         is_partial: !is_whole && end < rest.len(),
         crc,
-        ..Row::default()
+        ..OnlineRow::default()
     })
 }
 
@@ -279,7 +279,7 @@ pub(super) fn take(lines: &[Line<'_>]) -> Option<Block> {
     Some(block)
 }
 
-fn tell(block: &mut Block, row: Row) {
+fn tell(block: &mut Block, row: OnlineRow) {
     let whom = match (row.no, row.address) {
         (Some(no @ 1..), _) => SubDeviceRef::Position(no - 1),
         (_, Some(address)) => SubDeviceRef::Named(row.name.clone(), Some(address)),

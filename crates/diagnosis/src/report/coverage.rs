@@ -7,7 +7,8 @@ use super::{PlaceReport, build};
 use crate::coverage::{Coverage, Extent, Gap, Reason, Subject};
 
 /// What could be judged, and what not.
-#[derive(Clone, PartialEq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct CoverageReport {
     /// Whether enough was judged to call a line healthy of which nothing is said.
@@ -17,7 +18,8 @@ pub struct CoverageReport {
 }
 
 /// How far one subject was judged.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SubjectReport {
     /// The subject.
@@ -31,7 +33,8 @@ pub struct SubjectReport {
 }
 
 /// Something that was missing.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct GapReport {
     /// Why.

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::model::{Device, NetworkModel, Seen};
 
 /// A SubDevice. What the input does not say is `null`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DeviceReport {
     /// Its number, from 1.
@@ -46,34 +47,36 @@ impl DeviceReport {
             || self.revision.is_some()
             || self.serial.is_some()
     }
+
+    /// A SubDevice as the model knows it.
+    #[must_use]
+    pub fn of(device: &Device) -> Self {
+        let value = |seen: Option<Seen<u32>>| seen.map(|seen| seen.value);
+        let identity = &device.identity;
+        let code = device.al.code.filter(|_| device.al.has_error());
+        Self {
+            no: device.id.no(),
+            name: device.name.clone(),
+            type_name: device.type_name.clone(),
+            station: device.station.map(|station| station.value()),
+            alias: device.alias.map(|alias| alias.0),
+            vendor_id: value(identity.vendor_id),
+            product_code: value(identity.product_code),
+            revision: value(identity.revision),
+            serial: value(identity.serial),
+            chip: device.chip.map(|chip| chip.value.name().to_owned()),
+            state: device.al.state().map(|state| state.name().to_owned()),
+            al_status_code: code.map(|code| code.value.value()),
+            answers: match (device.silent, device.answered) {
+                (Some(_), _) => Some(false),
+                (None, Some(_)) => Some(true),
+                (None, None) => None,
+            },
+        }
+    }
 }
 
 /// All SubDevices of a line.
 pub(crate) fn reports(model: Option<&NetworkModel>) -> Vec<DeviceReport> {
-    model.map_or_else(Vec::new, |model| model.devices.iter().map(report).collect())
-}
-
-fn report(device: &Device) -> DeviceReport {
-    let value = |seen: Option<Seen<u32>>| seen.map(|seen| seen.value);
-    let identity = &device.identity;
-    let code = device.al.code.filter(|_| device.al.has_error());
-    DeviceReport {
-        no: device.id.no(),
-        name: device.name.clone(),
-        type_name: device.type_name.clone(),
-        station: device.station.map(|station| station.value()),
-        alias: device.alias.map(|alias| alias.0),
-        vendor_id: value(identity.vendor_id),
-        product_code: value(identity.product_code),
-        revision: value(identity.revision),
-        serial: value(identity.serial),
-        chip: device.chip.map(|chip| chip.value.name().to_owned()),
-        state: device.al.state().map(|state| state.name().to_owned()),
-        al_status_code: code.map(|code| code.value.value()),
-        answers: match (device.silent, device.answered) {
-            (Some(_), _) => Some(false),
-            (None, Some(_)) => Some(true),
-            (None, None) => None,
-        },
-    }
+    model.map_or_else(Vec::new, |model| model.devices.iter().map(DeviceReport::of).collect())
 }

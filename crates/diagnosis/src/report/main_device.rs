@@ -9,7 +9,8 @@ use crate::main_device::{Access, Certainty, MainDeviceKind, Mark};
 use crate::model::NetworkModel;
 
 /// The MainDevice that drives the line, recognised by its habits.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct MainDeviceReport {
     /// Its kind.
@@ -27,7 +28,8 @@ pub struct MainDeviceReport {
 }
 
 /// A register that is read again and again.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PollReport {
     /// Its address.
@@ -43,7 +45,8 @@ pub struct PollReport {
 }
 
 /// A register.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RegisterReport {
     /// Its address.

@@ -11,6 +11,7 @@ pub mod main_device;
 pub mod number;
 mod place_text;
 pub(crate) mod reading;
+pub mod second_look;
 
 use linesman_config::fault::{Class, FaultName};
 use serde::{Deserialize, Serialize};
@@ -22,12 +23,14 @@ pub use coverage::CoverageReport;
 pub use device::DeviceReport;
 pub use main_device::MainDeviceReport;
 pub use number::Number;
+pub use second_look::SecondLook;
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "linesman.diagnosis/1";
 
 /// A whole diagnosis.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Diagnosis {
     /// `linesman.diagnosis/1`.
@@ -62,12 +65,16 @@ pub struct Diagnosis {
     /// Of a pasted text: what was understood, and what not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub understood: Option<Understood>,
+    /// What became of a finding of an earlier diagnosis after something was exchanged; left out where nobody asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_look: Option<SecondLook>,
     /// What is wrong, worst first.
     pub findings: Vec<FindingReport>,
 }
 
 /// What it all comes to.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// No error or warning was found, and enough was judged to have shown one.
@@ -79,7 +86,8 @@ pub enum Verdict {
 }
 
 /// The network in numbers.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct NetworkReport {
     /// Controllers: the largest of answers to a broadcast, stations that answered, positions seen.
@@ -100,7 +108,8 @@ pub struct NetworkReport {
 }
 
 /// Something that is, or was, wrong.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FindingReport {
     /// Unique in this run: `F1`, `F2`.
@@ -126,7 +135,7 @@ pub struct FindingReport {
     /// Why.
     pub cause: FaultName,
     /// How sure, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 1.0)))]
     pub confidence: f64,
     /// What else it may be.
     pub alternatives: Vec<AlternativeReport>,
@@ -139,7 +148,8 @@ pub struct FindingReport {
 }
 
 /// The life of a finding.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FindingState {
     /// Seen, not certain yet.
@@ -151,7 +161,8 @@ pub enum FindingState {
 }
 
 /// A place.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum PlaceReport {
     /// A link between two ports.
@@ -182,7 +193,8 @@ pub enum PlaceReport {
 }
 
 /// An end of a link.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EndReport {
     /// The controller, from 1; 0 is the MainDevice.
@@ -192,7 +204,8 @@ pub struct EndReport {
 }
 
 /// A direction of a link.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum DirectionReport {
     /// Away from the MainDevice.
@@ -204,7 +217,8 @@ pub enum DirectionReport {
 }
 
 /// Another explanation.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AlternativeReport {
     /// Why.
@@ -213,7 +227,7 @@ pub struct AlternativeReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub place: Option<PlaceReport>,
     /// How sure, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 1.0)))]
     pub confidence: f64,
     /// What would tell it from the first cause, where something does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -221,7 +235,8 @@ pub struct AlternativeReport {
 }
 
 /// What shows it.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct EvidenceReport {
     /// Where it comes from.

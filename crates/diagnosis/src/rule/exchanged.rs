@@ -5,7 +5,7 @@
 
 use linesman_config::fault::FaultName;
 use linesman_proto::address::{DeviceId, Path};
-use linesman_proto::topology::End;
+use linesman_proto::topology::{End, Link};
 
 use super::{Rule, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place};
@@ -48,13 +48,19 @@ fn touches(model: &NetworkModel, at: ExchangePlace, place: &Place) -> bool {
             let known = model.links().nth(link);
             known.is_some_and(|known| known.upstream == *a && Some(known.downstream) == *b)
         }
+        (ExchangePlace::Ends(one, other), Place::Link { a, b, .. }) => {
+            one == *a && Some(other) == *b
+        }
         (ExchangePlace::Device(id), Place::Link { a, b, .. }) => {
             a.node() == Some(id) || b.is_some_and(|b| b.node() == Some(id))
         }
         (ExchangePlace::Device(id), Place::Device { device, .. }) => id == *device,
         (ExchangePlace::Host, Place::Host) => true,
         (ExchangePlace::Host, Place::Link { a, .. }) => *a == End::MainDevice(Path::A),
-        (ExchangePlace::Link(_), Place::Device { .. } | Place::Network { .. } | Place::Host)
+        (
+            ExchangePlace::Link(_) | ExchangePlace::Ends(..),
+            Place::Device { .. } | Place::Network { .. } | Place::Host,
+        )
         | (ExchangePlace::Device(_), Place::Network { .. } | Place::Host)
         | (ExchangePlace::Host, Place::Device { .. } | Place::Network { .. }) => false,
     }
@@ -168,6 +174,9 @@ fn say(view: &View<'_>, exchange: &PartExchange, condition: &mut Condition) {
             Some(known) => Place::link(model.network, known, None).to_string(),
             None => "a link".to_owned(),
         },
+        ExchangePlace::Ends(upstream, downstream) => {
+            Place::link(model.network, Link { upstream, downstream }, None).to_string()
+        }
         ExchangePlace::Device(id) => model.label(id),
         ExchangePlace::Host => "the computer".to_owned(),
     };

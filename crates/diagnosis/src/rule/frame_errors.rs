@@ -108,13 +108,12 @@ fn add(
     let at = place(input, most_likely.spot);
     let mut condition =
         Condition::new(page, at, most_likely.cause, first).confidence(most_likely.weight);
-    if suspicion.frames() == 0 {
-        condition.severity = Severity::Warning;
-    }
-    if is_unknown && suspicion.frames() == 1 {
+    condition.severity = match suspicion.frames() {
+        0 => Severity::Warning,
         // One frame may get lost on a good line; it is worth knowing, no more.
-        condition.severity = Severity::Info;
-    }
+        1 if is_unknown => Severity::Info,
+        _ => condition.severity,
+    };
     for other in &suspicion.suspects[1..] {
         let place = place(input, other.spot);
         condition.alternatives.push(Alternative {
@@ -192,7 +191,7 @@ fn is_history(input: &LocateInput<'_>, suspicion: &Suspicion) -> bool {
 
 /// SubDevices that lost nothing but time: frames that are damaged or lost bring neither outputs nor the
 /// time of the reference clock. A hardware cause wins over what software shows of it (SW-06).
-fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
+pub(super) fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
     let is_of_time = |error: &AlError| {
         let code = error.code.map(|code| code.value);
         code.is_some_and(|code| {
@@ -211,9 +210,11 @@ fn symptoms(input: &LocateInput<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
         End::Controller(id, port) => Some(Symptom::PortErrors(id, port)),
         End::MainDevice(_) => None,
     });
-    let card = suspicion.last_hop.as_ref().map(|hop| match hop {
-        LastHop::Damaged { .. } => Symptom::CardErrors,
-        LastHop::Unknown { .. } => Symptom::FramesLost,
+    let card = suspicion.last_hop.as_ref().and_then(|hop| match hop {
+        LastHop::Damaged { .. } => Some(Symptom::CardErrors),
+        LastHop::Unknown { is_beside: false, .. } => Some(Symptom::FramesLost),
+        // The other damage, which explains lost frames, does not explain these.
+        LastHop::Unknown { is_beside: true, .. } => None,
     });
     ports.chain(card).collect()
 }
@@ -291,10 +292,13 @@ fn card_evidence(last_hop: &LastHop) -> Evidence {
             "card {card} dropped {frames} bad frames that no SubDevice had found bad: they were \
              spoiled on the last way, from the first SubDevice to the card"
         ),
-        LastHop::Unknown { .. } => format!(
-            "{frames} frames did not come back to card {card}, and no counter of any SubDevice moved; \
-             the counters of the card are not known"
-        ),
+        LastHop::Unknown { is_beside, .. } => {
+            let when = if *is_beside { " at these moments" } else { "" };
+            format!(
+                "{frames} frames did not come back to card {card}, and no counter of any SubDevice \
+                 moved{when}; the counters of the card are not known"
+            )
+        }
     };
     Evidence::host(Some(last_hop.last()), text)
 }

@@ -121,19 +121,7 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
     if single == 0 || !went_on || model.sees_all_orders || traffic.is_one_sided() || is_recorder {
         return None;
     }
-    let explains = |one: &Condition| {
-        let is_then = one.since.before(AROUND) <= last
-            && one.ended.is_none_or(|ended| ended + AROUND >= first);
-        let all = || one.explains.iter().chain(&one.symptoms);
-        is_then
-            && all().any(|symptom| {
-                matches!(
-                    symptom,
-                    Symptom::FramesLost | Symptom::NobodyAnswers | Symptom::CardErrors
-                )
-            })
-    };
-    if conditions.iter().any(explains) {
+    if conditions.iter().any(|one| explains_losses(one, first, last)) {
         return None;
     }
     let damaged = model.host.is_watched.then_some(model.host.card(Path::A).crc.sum);
@@ -180,6 +168,17 @@ fn seen(view: &View<'_>, conditions: &[Condition]) -> Option<Condition> {
         condition = condition.ended(last);
     }
     Some(advise(condition, model, damaged, damaged.unwrap_or(0)))
+}
+
+/// True if a condition explains frames that were lost between two times.
+fn explains_losses(condition: &Condition, first: Instant, last: Instant) -> bool {
+    let is_then = condition.since.before(AROUND) <= last
+        && condition.ended.is_none_or(|ended| ended + AROUND >= first);
+    let mut symptoms = condition.explains.iter().chain(&condition.symptoms);
+    let is_loss = |symptom: &Symptom| {
+        matches!(symptom, Symptom::FramesLost | Symptom::NobodyAnswers | Symptom::CardErrors)
+    };
+    is_then && symptoms.any(is_loss)
 }
 
 /// SubDevices that lost their step with the frames after some frames got lost.

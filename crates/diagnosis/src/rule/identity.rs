@@ -60,13 +60,13 @@ pub const EXTRA: RulePage = RulePage {
 pub const RULE: Rule = Rule { pages: &[WRONG, MISSING, EXTRA], judge };
 
 /// A place in the order of processing: who is planned there, and who was found there.
-struct Slot {
+struct PlaceInOrder {
     id: DeviceId,
     planned: Option<(Identity, Planned)>,
     found: Option<Seen<Identity>>,
 }
 
-impl Slot {
+impl PlaceInOrder {
     fn mismatch(&self) -> Option<Mismatch> {
         Self::between(self, self)
     }
@@ -104,8 +104,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             let other = slots.iter().enumerate().find(|(other, there)| {
                 *other != index
                     && there.mismatch().is_some()
-                    && Slot::between(slot, there).is_none()
-                    && Slot::between(there, slot).is_none()
+                    && PlaceInOrder::between(slot, there).is_none()
+                    && PlaceInOrder::between(there, slot).is_none()
             });
             conditions.extend(wrong(model, slot, what, other.map(|(_, there)| there.id)));
         }
@@ -113,7 +113,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
 }
 
 /// All places in the order of processing, those beyond the plan last.
-fn slots(model: &NetworkModel) -> Vec<Slot> {
+fn slots(model: &NetworkModel) -> Vec<PlaceInOrder> {
     let planned =
         model.tree.iter().flat_map(|tree| tree.order()).map(|node| DeviceId(*node as u32));
     let mut order: Vec<DeviceId> = planned.collect();
@@ -123,7 +123,7 @@ fn slots(model: &NetworkModel) -> Vec<Slot> {
     order.into_iter().filter_map(|id| model.device(id)).map(slot).collect()
 }
 
-fn slot(device: &Device) -> Slot {
+fn slot(device: &Device) -> PlaceInOrder {
     let planned = device.planned.and_then(|plan| Some((plan.identity?, plan)));
     let found = device.identity.identity().map(|identity| {
         let read = device.identity.product_code;
@@ -133,11 +133,11 @@ fn slot(device: &Device) -> Slot {
             read.and_then(|read| read.frame),
         )
     });
-    Slot { id: device.id, planned, found }
+    PlaceInOrder { id: device.id, planned, found }
 }
 
 /// One stretch too few or too many that explains all differences.
-fn moved(model: &NetworkModel, slots: &[Slot]) -> Option<Condition> {
+fn moved(model: &NetworkModel, slots: &[PlaceInOrder]) -> Option<Condition> {
     let planned = slots.iter().filter(|slot| slot.planned.is_some()).count();
     let found = slots.iter().rposition(|slot| slot.found.is_some())? + 1;
     let first = slots.iter().position(|slot| slot.mismatch().is_some())?;
@@ -153,7 +153,7 @@ fn moved(model: &NetworkModel, slots: &[Slot]) -> Option<Condition> {
         } else {
             (slots.get(index), slots.get(index + by))
         };
-        plan.zip(there).is_some_and(|(plan, there)| Slot::between(plan, there).is_none())
+        plan.zip(there).is_some_and(|(plan, there)| PlaceInOrder::between(plan, there).is_none())
     };
     if !behind.clone().all(fits) {
         return None;
@@ -187,14 +187,14 @@ fn moved(model: &NetworkModel, slots: &[Slot]) -> Option<Condition> {
 
 /// All behind answer from another place than planned: ports that should lead on end the line, and the
 /// last planned ones never answer.
-fn shifted(slots: &[Slot], first: usize) -> Vec<Symptom> {
+fn shifted(slots: &[PlaceInOrder], first: usize) -> Vec<Symptom> {
     let first = first.saturating_sub(1);
     displaced(slots[first..].iter().map(|slot| slot.id)).collect()
 }
 
 fn wrong(
     model: &NetworkModel,
-    slot: &Slot,
+    slot: &PlaceInOrder,
     what: Mismatch,
     swapped_with: Option<DeviceId>,
 ) -> Option<Condition> {

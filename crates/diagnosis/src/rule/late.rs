@@ -6,8 +6,8 @@
 //! for on its card is the frame before it. One that takes 60 µs more than the shortest of its length, and far
 //! more than this computer usually wanders, was kept back. Many in a row that take the same longer time took
 //! another way: no finding; nor is it one as long as no process data are exchanged in a cycle. A recording tells
-//! it too, since it has the times at which frames went out and came back. Where nobody keeps step with SYNC
-//! signals, it is told of frames that are late by a tenth of the cycle or more. A computer that keeps frames back from
+//! it too, since it has the times at which frames went out and came back. It is told of frames that are late by a
+//! tenth of the cycle or more, and of any that cost a SubDevice its step. A computer that keeps frames back from
 //! the first one on shows by the fastest frames: two in a hundred that are later by a fifth of the cycle are told.
 //!
 //! **What it means.** The line is well: no controller counts anything. The computer, its card, a switch or a
@@ -72,7 +72,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     // Nobody waits for a frame that is sent when its sender likes.
     let keeps_step = model.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
     let Some(cycle) = shortest_cycle(model) else { return };
-    let matters = |late: &Late| keeps_step || late.worst * NOTABLE >= cycle;
+    // What is late by less does no harm, unless somebody lost step by it.
+    let hurts = |late: &Late| keeps_step && !hurt(model, late).is_empty();
+    let matters = |late: &Late| late.worst * NOTABLE >= cycle || hurts(late);
     let unusual = unusual(model, cycle).filter(matters);
     let Some(late) = unusual.or_else(|| held_back(model, cycle)) else { return };
     conditions.push(condition(view, &late, cycle, keeps_step));
@@ -147,12 +149,7 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
         .shown_by(Evidence::frame(last.sent + last.by, last.frame, late.text.clone()))
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
-    // The set-up of SYNC signals may have been before the first frame that was seen.
-    let may_be_unseen = !model.sees_all_orders;
-    let may_keep_step = |device: &&Device| device.sync_on.map_or(may_be_unseen, |on| on.value);
-    let in_step = model.devices.iter().filter(may_keep_step);
-    let hurt: Vec<&Device> =
-        in_step.filter(|device| device.lost_step_within(first.sent, last.sent + last.by)).collect();
+    let hurt = hurt(model, late);
     if hurt.is_empty() && is_recorded {
         let text = match keeps_step {
             true => "no SubDevice has lost its step meanwhile, as far as the recording shows",
@@ -175,6 +172,16 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
         condition = condition.ended(last.sent + last.by);
     }
     condition
+}
+
+/// SubDevices that lost step while frames were late.
+fn hurt<'m>(model: &'m NetworkModel, late: &Late) -> Vec<&'m Device> {
+    // The set-up of SYNC signals may have been before the first frame that was seen.
+    let may_be_unseen = !model.sees_all_orders;
+    let may_keep_step = |device: &&Device| device.sync_on.map_or(may_be_unseen, |on| on.value);
+    let in_step = model.devices.iter().filter(may_keep_step);
+    let until = late.last.sent + late.last.by;
+    in_step.filter(|device| device.lost_step_within(late.first.sent, until)).collect()
 }
 
 /// The shortest cycle of process data.

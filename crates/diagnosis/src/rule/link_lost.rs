@@ -27,6 +27,7 @@
 
 mod card;
 mod never_seen;
+mod other_way;
 mod swallowed_half;
 
 use std::collections::BTreeSet;
@@ -300,11 +301,10 @@ fn causes(model: &NetworkModel, tree: &Tree, drops: &LinkLosses, behind: Option<
         return never;
     }
     let is_repeated = drops.count >= AGAIN;
+    let is_of_ring = tree.is_on_ring(drops.link) || other_way::is_there(model, tree, drops);
     let sure = if drops.count >= OFTEN { 0.75 } else { 0.6 };
     match drops.longest() {
-        None if tree.is_on_ring(drops.link) && !is_repeated => {
-            (RingOpen, 0.75, vec![(LinkFlapping, None, 0.15)])
-        }
+        None if is_of_ring && !is_repeated => (RingOpen, 0.75, vec![(LinkFlapping, None, 0.15)]),
         None => {
             let off = if behind.is_some_and(|node| is_on_terminal_bus(model, node)) {
                 (0.5, 0.35, 0.05)
@@ -320,7 +320,7 @@ fn causes(model: &NetworkModel, tree: &Tree, drops: &LinkLosses, behind: Option<
         Some(_) if is_repeated => {
             (LinkFlapping, sure, vec![(BrownOut, behind, 0.1), (CableDegraded, None, 0.05)])
         }
-        Some(_) if tree.is_on_ring(drops.link) => (RingOpen, 0.6, vec![(LinkFlapping, None, 0.3)]),
+        Some(_) if is_of_ring => (RingOpen, 0.6, vec![(LinkFlapping, None, 0.3)]),
         Some(longest) if longest < SHORT => {
             (LinkOpen, 0.45, vec![(LinkFlapping, None, 0.35), (BrownOut, behind, 0.1)])
         }

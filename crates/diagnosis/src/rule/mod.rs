@@ -6,6 +6,7 @@
 pub mod assumed_wiring;
 pub mod clock_drift;
 pub mod counters;
+pub mod damage_at_probe;
 pub mod device_message;
 pub mod early_link;
 pub mod ebus_budget;
@@ -145,6 +146,7 @@ pub const RULES: &[Rule] = &[
     reported_late::RULE,
     long_delay::RULE,
     errors_at_device::RULE,
+    damage_at_probe::RULE,
     frames_unplaced::RULE,
     link_changed::RULE,
     exchanged::RULE,

@@ -52,7 +52,7 @@ pub const PAGE: RulePage = RulePage {
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
-/// So many requests in a row without a return are no accident.
+/// Requests in a row without a return that are no accident.
 pub(super) const CERTAIN: u64 = 8;
 /// With fewer, the end of the input may have cut off the answer.
 const FEW: u64 = 3;

@@ -66,6 +66,10 @@ struct PauseFound<'a> {
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let model = view.model;
+    if model.capture_probe.inside().is_some() {
+        // A probe inside the line does not see what the MainDevice sends.
+        return;
+    }
     let mut all: Vec<PauseFound<'_>> = Vec::new();
     for device in &model.devices {
         let mut errors = device.al.errors.iter();

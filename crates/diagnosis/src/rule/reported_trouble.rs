@@ -48,6 +48,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     conditions.extend(high_counters(model));
 }
 
+// Long for its number of troubles: one arm each, which is a whole condition.
 fn of_device(
     model: &NetworkModel,
     device: &Device,

@@ -9,12 +9,14 @@
 //!
 //! **What it means.** For a fall to INIT the supply was gone: for a moment (brown-out), or for longer
 //! (device or supply off). When several SubDevices fall at the same moment, they share the supply that
-//! failed. A fall to another state without an error code is the doing of the firmware. The links that
+//! failed. When all terminals of a coupler fall, or all from one of them to the end, and the coupler does not,
+//! it is the voltage of their terminal bus: an overload. A fall to another state without an error code is the doing of the firmware. The links that
 //! the device lost meanwhile are listed beneath.
 //!
 //! **What to do.** Measure the supply of the SubDevice under load, at the device; look what is switched
 //! at these moments.
 
+mod terminal_bus;
 mod unseen;
 
 use std::collections::BTreeSet;
@@ -59,7 +61,11 @@ const TOGETHER: Span = Span::ms(500);
 /// An outage that ended so long before the state was seen may belong to it: addresses are given and
 /// states read only after a scan.
 const BEFORE: Span = Span::s(3);
-/// A link needs up to two seconds to come up again: only a longer outage was no mere dip.
+/// A supply that is back within a second dipped (IEC 61000-4-29 tests DC ports with dips and short interruptions of up
+/// to a second); one that stays away for longer failed.
+const DIP: Span = Span::s(1);
+/// Links of cables come up in 0.3 to 5 s. Where nothing tells how long those of a line need, an outage that is longer than
+/// this is more likely a failure that was followed by a short negotiation than a dip followed by a long one.
 const LONG: Span = Span::ms(2500);
 
 /// Lost-link counters are read in turn: one may show the outage so long after it.
@@ -85,8 +91,24 @@ impl Fall<'_> {
         self.began() <= other.change.at + TOGETHER && other.began() <= self.change.at + TOGETHER
     }
 
-    fn was_long(&self) -> bool {
-        self.gone.is_some_and(|(since, until)| until.since(since) >= LONG)
+    /// True if the supply was away for longer than a dip, as far as the outage and the time that a link needs tell.
+    fn was_long(&self, model: &NetworkModel, together: &[Self]) -> bool {
+        let Some((since, until)) = self.gone else { return false };
+        let node = self.device.id.index();
+        let above = model.tree.as_ref().filter(|tree| node < tree.len());
+        let above = above.and_then(|tree| tree.upstream(node)?.node());
+        let is_alone = !together.iter().any(|other| Some(other.device.id.index()) == above);
+        // Who starts anew again and again has a supply that dips again and again.
+        let falls = self.device.al.changes.iter().filter(|change| change.is_own_fall()).count();
+        // A contact of the terminal bus has its link at once, if the one before kept its own.
+        let bound = if falls > 1 {
+            LONG
+        } else if is_alone && link_lost::is_on_terminal_bus(model, node) {
+            DIP
+        } else {
+            shortest_outage(model).map_or(LONG, |link_up| LONG.min(link_up + DIP))
+        };
+        until.since(since) >= bound
     }
 }
 
@@ -180,12 +202,47 @@ fn outage(model: &NetworkModel, device: &Device, change: &AlChange) -> Option<(I
     all.find(latest)
 }
 
+/// The shortest outage of a cable's link that this line has shown: its links come up in no more than that.
+fn shortest_outage(model: &NetworkModel) -> Option<Span> {
+    let of_port = |device: &Device, port: Port| {
+        let mut down = None;
+        let mut shortest: Option<Span> = None;
+        for seen in &device.dl.changes {
+            match (seen.from.port_state(port).is_active(), seen.to.port_state(port).is_active()) {
+                (true, false) => down = Some(seen.at),
+                (false, true) => {
+                    let lasted = down.take().map(|since| seen.at.since(since));
+                    shortest = shortest.into_iter().chain(lasted).min();
+                }
+                (true, true) | (false, false) => {}
+            }
+        }
+        shortest
+    };
+    let is_cable = |device: &Device, port: Port| {
+        let behind = model.opposite(device.id, port).and_then(|end| end.node());
+        [Some(device.id), behind.filter(|_| port != Port::A)]
+            .into_iter()
+            .flatten()
+            .all(|id| !link_lost::is_on_terminal_bus(model, id.index()))
+    };
+    let ports = |device| Port::ALL.into_iter().map(move |port| (device, port));
+    let all = model.devices.iter().flat_map(ports);
+    all.filter(|(device, port)| is_cable(device, *port))
+        .filter_map(|(device, port)| of_port(device, port))
+        .min()
+}
+
 fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
     let device = fall.device;
     let is_several = together.len() > 1;
     let is_first = together.iter().all(|other| device.id <= other.device.id);
-    let was_long = together.iter().any(Fall::was_long);
+    let was_long = together.iter().any(|one| one.was_long(model, together));
+    let feeder = is_first.then(|| terminal_bus::common_feeder(model, together)).flatten();
     let (cause, others) = match (was_long, is_several) {
+        _ if feeder.is_some() => {
+            (FaultName::EbusOverload, [(FaultName::BrownOut, 0.2), (FaultName::SupplyOff, 0.1)])
+        }
         (true, true) => {
             (FaultName::SupplyOff, [(FaultName::BrownOut, 0.15), (FaultName::DeviceOff, 0.1)])
         }
@@ -196,7 +253,7 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
             (FaultName::BrownOut, [(FaultName::DeviceOff, 0.15), (FaultName::FirmwareFault, 0.1)])
         }
     };
-    let place = Place::device(model.network, device.id);
+    let place = Place::device(model.network, feeder.unwrap_or(device.id));
     let mut condition = Condition::new(&RESTARTED, place, cause, fall.began())
         .confidence(0.7)
         .confirmed(fall.change.at)
@@ -204,7 +261,7 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
     }
-    if link_lost::is_on_terminal_bus(model, device.id.index()) {
+    if feeder.is_none() && link_lost::is_on_terminal_bus(model, device.id.index()) {
         // Terminals that lose the voltage of the E-bus start anew, whatever took it.
         condition = condition.or(FaultName::EbusOverload, 0.05);
     }
@@ -234,6 +291,16 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
         && let Some(status) = device.al.status
     {
         condition = condition.ended(status.at);
+    }
+    if let Some(feeder) = feeder {
+        return condition
+            .advise(format!(
+                "Add up the currents that the terminals behind {} take (`linesman plan`): from where the sum exceeds \
+                 what it supplies, insert a power feed terminal.",
+                model.label(feeder)
+            ))
+            .advise("Take off the terminal that was added last, or the last ones, and look again.")
+            .advise(format!("Exchange {}, whose supply of the terminal bus may be weak.", model.label(feeder)));
     }
     if is_several {
         condition = condition.advise(

@@ -234,18 +234,7 @@ fn condition(
     let model = view.model;
     let place = Place::device(model.network, device.id);
     let meaning = error.code.map(|code| code.value.explain());
-    let cause = match page.code {
-        // The code itself blames what was configured.
-        "S200" if meaning.is_some_and(|meaning| meaning.class == CodeClass::Configuration) => {
-            FaultName::ConfigMismatch
-        }
-        "S200" if has_no_values(model, device, error) => FaultName::FirmwareFault,
-        "S200" => FaultName::InitRefused,
-        "S202" => FaultName::WatchdogStarved,
-        "T400" => out_of_step(device, error),
-        _ if error.code.is_none() && error.may_be_watchdog() => FaultName::WatchdogStarved,
-        _ => FaultName::FirmwareFault,
-    };
+    let cause = cause(model, device, page, error);
     let mut condition = Condition::new(page, place, cause, error.status.at)
         .confidence(if meaning.is_some() { 0.8 } else { 0.6 })
         .confirmed(error.status.at)
@@ -255,38 +244,7 @@ fn condition(
             Symptom::Emergency(device.id),
             Symptom::InputsStill(device.id),
         ]);
-    condition = match (cause, meaning.map(|meaning| meaning.class)) {
-        (FaultName::ConfigMismatch, _) => condition.or(FaultName::InitRefused, 0.15),
-        (FaultName::FirmwareFault, _) if page.code == "S200" => {
-            condition.confidence(0.6).or(FaultName::InitRefused, 0.25)
-        }
-        (FaultName::InitRefused, Some(CodeClass::Timing)) => {
-            condition.or(FaultName::SyncLost, 0.15)
-        }
-        (FaultName::InitRefused, _) => condition.or(FaultName::FirmwareFault, 0.1),
-        (FaultName::WatchdogStarved, None) => condition
-            .confidence(0.4)
-            .or(FaultName::SyncLost, 0.15)
-            .or(FaultName::FirmwareFault, 0.15)
-            .or(FaultName::InitRefused, 0.1)
-            .or_at(FaultName::HostJitter, Place::Host, 0.05),
-        (FaultName::WatchdogStarved, _) => {
-            condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::LateFrames, 0.05)
-        }
-        (FaultName::SyncLost, _) => {
-            condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::ClockDrift, 0.05)
-        }
-        (FaultName::CycleTooFast, _) => {
-            let is_counted = exceeded(device).is_some();
-            let (sure, other) = if is_counted { (0.9, 0.03) } else { (0.6, 0.12) };
-            condition
-                .confidence(sure)
-                .or(FaultName::FirmwareFault, other)
-                .or(FaultName::ClockDrift, other)
-                .or_at(FaultName::HostJitter, Place::Host, 0.03)
-        }
-        _ => condition.or(FaultName::ConfigMismatch, 0.1),
-    };
+    condition = with_alternatives(condition, device, page, meaning.map(|meaning| meaning.class));
     if page.code == "T400" {
         // What it refuses on its way back is more of the same.
         condition = condition.explaining([Symptom::StateLost(device.id)]);
@@ -321,6 +279,68 @@ fn condition(
         }
     }
     condition
+}
+
+/// The most likely cause of an error.
+fn cause(
+    model: &NetworkModel,
+    device: &Device,
+    page: &'static RulePage,
+    error: &AlError,
+) -> FaultName {
+    let class = error.code.map(|code| code.value.explain().class);
+    match page.code {
+        // The code itself blames what was configured.
+        "S200" if class == Some(CodeClass::Configuration) => FaultName::ConfigMismatch,
+        "S200" if has_no_values(model, device, error) => FaultName::FirmwareFault,
+        "S200" => FaultName::InitRefused,
+        "S202" => FaultName::WatchdogStarved,
+        "T400" => out_of_step(device, error),
+        _ if error.code.is_none() && error.may_be_watchdog() => FaultName::WatchdogStarved,
+        _ => FaultName::FirmwareFault,
+    }
+}
+
+/// A condition with the other causes that its cause is taken for; `class` is that of the AL status code, where one was
+/// read.
+fn with_alternatives(
+    condition: Condition,
+    device: &Device,
+    page: &'static RulePage,
+    class: Option<CodeClass>,
+) -> Condition {
+    match (condition.cause, class) {
+        (FaultName::ConfigMismatch, _) => condition.or(FaultName::InitRefused, 0.15),
+        (FaultName::FirmwareFault, _) if page.code == "S200" => {
+            condition.confidence(0.6).or(FaultName::InitRefused, 0.25)
+        }
+        (FaultName::InitRefused, Some(CodeClass::Timing)) => {
+            condition.or(FaultName::SyncLost, 0.15)
+        }
+        (FaultName::InitRefused, _) => condition.or(FaultName::FirmwareFault, 0.1),
+        (FaultName::WatchdogStarved, None) => condition
+            .confidence(0.4)
+            .or(FaultName::SyncLost, 0.15)
+            .or(FaultName::FirmwareFault, 0.15)
+            .or(FaultName::InitRefused, 0.1)
+            .or_at(FaultName::HostJitter, Place::Host, 0.05),
+        (FaultName::WatchdogStarved, _) => {
+            condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::LateFrames, 0.05)
+        }
+        (FaultName::SyncLost, _) => {
+            condition.or_at(FaultName::HostJitter, Place::Host, 0.1).or(FaultName::ClockDrift, 0.05)
+        }
+        (FaultName::CycleTooFast, _) => {
+            let is_counted = exceeded(device).is_some();
+            let (sure, other) = if is_counted { (0.9, 0.03) } else { (0.6, 0.12) };
+            condition
+                .confidence(sure)
+                .or(FaultName::FirmwareFault, other)
+                .or(FaultName::ClockDrift, other)
+                .or_at(FaultName::HostJitter, Place::Host, 0.03)
+        }
+        _ => condition.or(FaultName::ConfigMismatch, 0.1),
+    }
 }
 
 /// Whether a SubDevice refuses because its own application gives no values, or takes none though they are sent.

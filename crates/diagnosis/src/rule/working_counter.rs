@@ -48,16 +48,16 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 /// earlier or later still belongs to the deficit.
 const AROUND: Span = Span::ms(1500);
 
-/// So many deficits of one datagram have one cause that comes and goes.
+/// Number of deficits of one datagram that have one cause that comes and goes.
 const FLAPS: usize = 3;
 
-/// So soon after a deficit states and links have been read anew.
+/// Time after a deficit by which states and links have been read anew.
 const ASKED: Span = Span::ms(200);
 
 /// A deficit that has been over for so long is judged: what was known then of states and links may be forgotten since.
 const JUDGED_FOR: Span = Span::ms(2_500);
 
-/// Who did not do his share.
+/// SubDevice, or group of them, that did not do its share.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Suspects {
     /// They are the ones for sure; else one or some of them.
@@ -104,7 +104,7 @@ fn may_be_start_up(model: &NetworkModel, cyclic: &Cyclic, deficit: &Deficit) -> 
             || model.devices.iter().all(|device| device.al.status.is_none()))
 }
 
-/// Whose share other findings of that time account for.
+/// SubDevices for whose share other findings of that time account.
 fn explained(conditions: &[Condition], deficit: &Deficit) -> Vec<DeviceId> {
     let is_then = |condition: &&Condition| {
         let until = deficit.ended.unwrap_or(Instant::MAX);
@@ -205,14 +205,14 @@ fn suspects(
     }
 }
 
-/// Whether all hang behind the first of them.
+/// True if all hang behind the first of them.
 fn is_one_branch(model: &NetworkModel, suspected: &[(DeviceId, Vec<u16>)]) -> bool {
     let (Some(tree), Some((first, _))) = (&model.tree, suspected.first()) else { return false };
     let branch = tree.subtree(first.index());
     suspected.iter().all(|(device, _)| branch.contains(&device.index()))
 }
 
-/// What an owner can miss: its whole share first, then one direction of it.
+/// Shares that an owner can miss: its whole share first, then one direction of it.
 fn shares(cyclic: &Cyclic, owner: &Owner) -> Vec<u16> {
     let share = |reads, writes| cyclic.command.increment(reads, writes);
     let mut all = vec![share(owner.reads, owner.writes)];
@@ -253,7 +253,7 @@ fn fewest(shares: &[(DeviceId, Vec<u16>)], missing: u16) -> Option<Vec<DeviceId>
     best.pop().flatten().filter(|devices| !devices.is_empty())
 }
 
-/// What is known of an owner at the time of a deficit, the stronger the later.
+/// Knowledge of an owner at the time of a deficit, the stronger the later.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum OwnerEvidence {
     /// Nothing.
@@ -330,19 +330,8 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
             from <= event.at && event.at <= to
         })
     });
-    let nobody_known = suspects.devices.is_empty() && (lasts || link_changed.is_some());
-    let is_flapping = (!links.is_empty() || !suspects.is_certain || suspects.devices.is_empty())
-        && deficits.len() >= FLAPS;
-    let is_open = suspects.devices.len() > 1 && !suspects.is_certain && !lasts;
-    let symptom = match &known {
-        None if is_flapping => DeficitSymptom::AgainAndAgain,
-        _ if !links.is_empty() => DeficitSymptom::BehindLink,
-        Some(trouble) => DeficitSymptom::of_trouble(trouble),
-        None if nobody_known && link_changed.is_some() => DeficitSymptom::LinkChanged,
-        None if nobody_known => DeficitSymptom::Nobody,
-        None if is_open => DeficitSymptom::Passing,
-        None => DeficitSymptom::DeficitAlone,
-    };
+    let (has_links, has_changed) = (!links.is_empty(), link_changed.is_some());
+    let symptom = symptom(suspects, deficits, known.as_ref(), has_links, has_changed);
     let [(cause, confidence), others @ ..] = symptom.causes();
     let mut condition = Condition::new(&PAGE, place, cause, since).confidence(confidence);
     // Why it is so shows when states and links were read since.
@@ -385,18 +374,47 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
             condition.severity = Severity::Warning;
         }
     }
-    let names: Vec<_> = suspects.devices.iter().map(|id| model.label(*id)).collect();
-    condition = match (names.is_empty(), suspects.is_certain) {
-        (true, _) => condition.advise(
-            "Read AL status and DL status of all SubDevices: who is missing, or not in OP?",
-        ),
-        (false, true) => condition
-            .advise(format!("Read AL status (0x0130) and its code of {}.", names.join(", "))),
-        (false, false) => condition
-            .advise(format!("Read AL status (0x0130) of {}: one of them is it.", names.join(", "))),
-    };
     condition
+        .advise(read_states(model, suspects))
         .advise("Take no output of this datagram for written and no input for fresh meanwhile.")
+}
+
+/// The symptom that deficits show; `known` is trouble that was seen of the first suspect. `has_links` if links are
+/// suspected, `has_link_changed` if one is known to have changed then.
+fn symptom(
+    suspects: &Suspects,
+    deficits: &[(&Cyclic, &Deficit)],
+    known: Option<&Trouble>,
+    has_links: bool,
+    has_link_changed: bool,
+) -> DeficitSymptom {
+    let lasts = deficits.iter().any(|(_, deficit)| deficit.ended.is_none());
+    let is_nobody = suspects.devices.is_empty();
+    let nobody_known = is_nobody && (lasts || has_link_changed);
+    let is_flapping = (has_links || !suspects.is_certain || is_nobody) && deficits.len() >= FLAPS;
+    let is_open = suspects.devices.len() > 1 && !suspects.is_certain && !lasts;
+    match known {
+        None if is_flapping => DeficitSymptom::AgainAndAgain,
+        _ if has_links => DeficitSymptom::BehindLink,
+        Some(trouble) => DeficitSymptom::of_trouble(trouble),
+        None if nobody_known && has_link_changed => DeficitSymptom::LinkChanged,
+        None if nobody_known => DeficitSymptom::Nobody,
+        None if is_open => DeficitSymptom::Passing,
+        None => DeficitSymptom::DeficitAlone,
+    }
+}
+
+/// Advice to read the states of those that may be the cause.
+fn read_states(model: &NetworkModel, suspects: &Suspects) -> String {
+    let names: Vec<_> = suspects.devices.iter().map(|id| model.label(*id)).collect();
+    let names = names.join(", ");
+    match (suspects.devices.is_empty(), suspects.is_certain) {
+        (true, _) => {
+            "Read AL status and DL status of all SubDevices: who is missing, or not in OP?".into()
+        }
+        (false, true) => format!("Read AL status (0x0130) and its code of {names}."),
+        (false, false) => format!("Read AL status (0x0130) of {names}: one of them is it."),
+    }
 }
 
 fn evidence(model: &NetworkModel, cyclic: &Cyclic, deficit: &Deficit) -> Evidence {

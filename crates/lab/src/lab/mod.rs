@@ -5,6 +5,7 @@
 //! is one.
 
 mod capture_loss;
+mod capture_probe;
 mod diagnosis;
 mod driver;
 mod error;
@@ -124,6 +125,7 @@ impl Lab {
             },
             start: None,
             clock: "virtual".to_owned(),
+            exchanges: options.exchanges.clone(),
         };
         let mut settings = Options::default();
         if options.clocks || project.devices.iter().any(|device| device.clock.is_some()) {

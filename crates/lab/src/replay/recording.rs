@@ -118,11 +118,14 @@ pub struct Recorder {
     recording: Recording,
     /// Returns whose request was not seen.
     alone: Vec<Frame>,
+    /// Time of the latest frame.
+    latest: Instant,
 }
 
 impl Recorder {
     /// The next frame.
     pub fn take(&mut self, frame: &FrameSeen<'_>) {
+        self.latest = self.latest.max(frame.time);
         let view = match FrameView::parse(frame.bytes) {
             Ok(view) if frame.fcs != Some(false) && !frame.truncated => view,
             Err(FrameError::NotEtherCat { .. }) => {
@@ -144,7 +147,7 @@ impl Recorder {
     #[must_use]
     pub fn finish(mut self) -> Recording {
         let (recording, alone) = (&mut self.recording, &mut self.alone);
-        self.pairing.finish(&mut |exchange| note(recording, alone, exchange));
+        self.pairing.finish(self.latest, &mut |exchange| note(recording, alone, exchange));
         // By number: time stamps may run backwards.
         recording.turns.sort_by_key(|turn| turn.request.number);
         repair::repair(recording, std::mem::take(alone));

@@ -6,13 +6,15 @@ use linesman_proto::topology::Route;
 use linesman_sim::fault::KINDS;
 use linesman_sim::seed::{Seed, Stream};
 use linesman_sim::segment_file::{PlantOptions, SegmentFile, plant};
+use serde::{Deserialize, Serialize};
 
+use super::parts::span_ns;
 use super::perturb::Perturbation;
 use crate::choice::AT_RUN_TIME;
 use crate::habit::Habit;
 
 /// Choices for a score.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct ScoreOptions {
     /// Only this fault, one in each case.
     pub fault: Option<FaultName>,
@@ -20,6 +22,9 @@ pub struct ScoreOptions {
     pub capture_only: bool,
     /// Nothing is wrong in any case, but much is done that is no fault.
     pub healthy: bool,
+    /// Time that healthy lines run on, disturbed now and then.
+    #[serde(with = "span_ns")]
+    pub healthy_for: Span,
     /// What is other than the diagnosis expects.
     pub perturb: Option<Perturbation>,
     /// How the MainDevice drives the line. With another habit than ours nobody asks for registers, and listeners are
@@ -27,6 +32,8 @@ pub struct ScoreOptions {
     pub habit: Habit,
     /// Whether what listeners heard is kept.
     pub keeps_heard: bool,
+    /// True if plants and diagnoses are kept.
+    pub keeps_reports: bool,
 }
 
 impl ScoreOptions {
@@ -38,7 +45,7 @@ impl ScoreOptions {
 }
 
 /// What kind of case it is.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
 pub enum CaseKind {
     /// Nothing is wrong.
     Healthy,
@@ -71,6 +78,20 @@ pub struct Case {
     pub forwarded: bool,
     /// Whether what may begin early or late begins before the line is brought up.
     pub from_start: bool,
+    /// Relation of two faults: their places, and the time between their beginnings.
+    pub pair: FaultPair,
+    /// Errors so rare that they do not matter, on a cable that is not at fault: hits per second.
+    pub background: Option<f64>,
+}
+
+/// Two faults of one case.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub struct FaultPair {
+    /// True if one lies behind the other; else neither does.
+    pub is_in_line: bool,
+    /// From the beginning of the first to that of the second.
+    #[serde(with = "span_ns")]
+    pub apart: Span,
 }
 
 impl Case {
@@ -83,8 +104,8 @@ impl Case {
         let (kind, faults) = faults(options, &mut stream);
         let mut stream = seed.stream(&format!("score plant {attempt}"));
         let has = |names: &[FaultName]| faults.iter().any(|name| names.contains(name));
-        let ring = has(&[FaultName::RingOpen]) || stream.chance(0.12);
-        let clocks = has(&CLOCKED) || stream.chance(0.2);
+        let ring = has(&[FaultName::RingOpen]) || stream.chance(0.5);
+        let clocks = has(&CLOCKED) || stream.chance(0.5);
         let from_start = seed.stream("score begin").chance(0.5);
         let forwarded = !stream.chance(0.2);
         let host_counters = stream.chance(0.6);
@@ -92,16 +113,57 @@ impl Case {
         let mut file = line(seed, attempt, ring, &mut stream);
         file.counts_forwarded = (!forwarded).then_some(false);
         file.noise_at_link_up = stream.chance(0.2).then_some(3.0);
-        let is_masked = kind == CaseKind::Masked || (options.healthy && stream.chance(0.5));
+        link_times(&mut file, &mut seed.stream("score link-up"));
+        let mut extra = seed.stream("score beside");
+        let is_masked =
+            kind == CaseKind::Masked || extra.chance(if options.healthy { 0.5 } else { 0.25 });
+        let mut pair = pair(&mut extra);
+        // All else lies behind the card.
+        pair.is_in_line |= has(&[FaultName::NicDamaged]);
+        let has_background = kind == CaseKind::Single && extra.chance(0.15);
+        let background = has_background.then(|| extra.log_uniform(0.2, 2.0));
         if is_masked {
             mask(&mut file, &mut stream);
         }
         if let Some(perturb) = options.perturb {
             perturb.plant(&mut file, &mut seed.stream("score perturbed"));
         }
-        Self { seed, kind, faults, file, cycle, host_counters, clocks, forwarded, from_start }
+        Self {
+            seed,
+            kind,
+            faults,
+            file,
+            cycle,
+            host_counters,
+            clocks,
+            forwarded,
+            from_start,
+            pair,
+            background,
+        }
     }
 }
+
+/// Relation of two faults: on one line or on branches, at one moment or up to three seconds apart.
+fn pair(stream: &mut Stream) -> FaultPair {
+    let is_in_line = stream.chance(0.6);
+    let is_together = stream.chance(0.4);
+    let apart = if is_together { Span::ZERO } else { Span::us(stream.between(1_000, 3_000_000)) };
+    FaultPair { is_in_line, apart }
+}
+
+/// Links of cables come up in a time of their own: most plants have PHYs of one make, some are mixed.
+fn link_times(file: &mut SegmentFile, stream: &mut Stream) {
+    let draw = |stream: &mut Stream| stream.log_uniform(LINK_UP_MS.0, LINK_UP_MS.1).round();
+    let of_plant = draw(stream);
+    let is_mixed = stream.chance(0.3);
+    for device in file.devices.iter_mut().filter(|device| device.cable_m.is_some()) {
+        device.link_up_ms = Some(if is_mixed { draw(stream) } else { of_plant });
+    }
+}
+
+/// A link comes up in 0.3 to 5 s: two PHYs that negotiate, by make and by chance.
+const LINK_UP_MS: (f64, f64) = (300.0, 5_000.0);
 
 /// What shows only where SubDevices are in step with their clocks.
 const CLOCKED: [FaultName; 4] = [
@@ -120,10 +182,11 @@ fn faults(options: &ScoreOptions, stream: &mut Stream) -> (CaseKind, Vec<FaultNa
     };
     let catalogue = KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>();
     let drawn = stream.pick(&catalogue).copied();
-    // Behind a damaged card everything is hidden: it cannot be one of two that are both seen.
-    let apart = |name: &FaultName| kind != CaseKind::Double || *name != FaultName::NicDamaged;
-    let menu: Vec<FaultName> = AT_RUN_TIME.into_iter().filter(apart).collect();
-    let physical = [stream.pick(&menu).copied(), stream.pick(&menu).copied()];
+    let mut physical = [stream.pick(&AT_RUN_TIME).copied(), stream.pick(&AT_RUN_TIME).copied()];
+    if physical == [Some(FaultName::NicDamaged); 2] {
+        // There is one card that matters.
+        physical[1] = Some(FaultName::CableDegraded);
+    }
     if options.healthy {
         return (CaseKind::Healthy, Vec::new());
     }
@@ -141,14 +204,13 @@ fn faults(options: &ScoreOptions, stream: &mut Stream) -> (CaseKind, Vec<FaultNa
     (kind, faults)
 }
 
-/// A tree: mostly small, now and then up to 200 SubDevices.
+/// A tree of 2 to 200 SubDevices, as many of each order of magnitude.
 ///
 /// A ring that leaves a junction by another port than its last is not drawn: what hangs behind the
 /// later ports is processed by frames of the second card only, also while the ring is whole.
 fn line(seed: Seed, attempt: u32, ring: bool, stream: &mut Stream) -> SegmentFile {
-    let most = if stream.chance(0.04) { 200.0 } else { 40.0 };
-    let target = stream.log_uniform(2.0, most).round() as usize;
-    let all_types = stream.chance(0.2);
+    let target = stream.log_uniform(2.0, 200.0).round() as usize;
+    let all_types = stream.chance(0.5);
     for number in 0..8 {
         let options = PlantOptions {
             min_devices: target,

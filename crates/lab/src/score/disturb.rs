@@ -13,7 +13,7 @@ use linesman_sim::segment_file::FaultEntry;
 use crate::lab::{Lab, LabError};
 
 /// Jitter that nobody needs to mind, as a share of the cycle; the bar is at 20 % (SYN-31).
-const JITTER: (f64, f64) = (0.005, 0.1);
+pub(super) const JITTER: (f64, f64) = (0.005, 0.1);
 /// How much later than usual a device may answer its mailbox, in ms.
 const SLOW_MS: (f64, f64) = (1.0, 80.0);
 /// How long a line may take to be where it was after an order.

@@ -104,8 +104,12 @@ pub fn draw(name: FaultName, offer: &Offer<'_>, stream: &mut Stream) -> Option<D
 /// A dip of a supply lasts so long at most, in ms: IEC 61000-4-29 tests DC ports with dips and short
 /// interruptions of up to a second.
 const DIP_MS: f64 = 1_000.0;
-/// A device that comes back earlier than this, in ms, had a dip of its supply.
-const OFF_MS: f64 = 3_000.0;
+/// A device that stays away for longer lost its supply, for so long at most, in ms.
+const OFF_MS: f64 = 10_000.0;
+/// Hits in a second: four decades.
+const HITS_PER_S: (f64, f64) = (0.5, 5_000.0);
+/// Time that a broken link stays so, in ms.
+const OPEN_MS: (f64, f64) = (50.0, 10_000.0);
 
 struct Drawer<'a, 's> {
     name: FaultName,
@@ -128,7 +132,7 @@ impl Drawer<'_, '_> {
     /// A fault that stays, or is healed after a while.
     fn hard(&mut self, entry: FaultEntry) -> Drawn {
         let ends = if self.stream.chance(0.5) { Ends::Never } else { Ends::Healed };
-        Drawn { ends, ..self.lasting(entry, 200.0, 3_000.0) }
+        Drawn { ends, ..self.lasting(entry, OPEN_MS.0, OPEN_MS.1) }
     }
 
     fn number(&mut self, low: f64, high: f64) -> f64 {
@@ -224,7 +228,7 @@ impl Drawer<'_, '_> {
             let least = low_ms.max(f64::from(hits) * 2.0).min(high_ms);
             return self.lasting(entry.with("hits", hits), least, high_ms);
         }
-        let rate = self.stream.log_uniform(1.0, 5_000.0).round();
+        let rate = self.number(HITS_PER_S.0, HITS_PER_S.1);
         let least = low_ms.max(1_500.0 / rate).min(high_ms);
         self.lasting(entry.with("hits_per_s", rate), least, high_ms)
     }
@@ -308,7 +312,7 @@ impl Drawer<'_, '_> {
             self.lasting(entry, 3_000.0, 4_000.0)
         } else {
             let hard = self.hard(entry.clone());
-            Drawn { ends: hard.ends, ..self.lasting(entry, OFF_MS, 2.0 * OFF_MS) }
+            Drawn { ends: hard.ends, ..self.lasting(entry, DIP_MS, OFF_MS) }
         };
         Some(Self::at_device(drawn, id))
     }
@@ -324,7 +328,7 @@ impl Drawer<'_, '_> {
             .entry()
             .device(&device.name)
             .with("supply_ma", 1.0)
-            .with("off_ms", self.number(20.0, 500.0))
+            .with("off_ms", self.number(20.0, DIP_MS))
             .with("on_ms", self.number(300.0, 3_000.0));
         let drawn = self.lasting(entry, 2_000.0, 5_000.0);
         Some(Self::at_device(drawn, self.id(device)?))

@@ -1,11 +1,15 @@
 //! Number of effects of a fault: what the truth log says of it, less what no observer could ever
 //! see.
 
+use linesman_config::fault::FaultName;
 use linesman_proto::address::DeviceId;
+use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 use linesman_sim::device::SoftwareFault;
+use linesman_sim::segment_file::{FaultEntry, Value};
 use linesman_sim::truth::{Effect, Entry, FaultRecord, Place};
 
+use super::disturb::JITTER;
 use crate::lab::Lab;
 
 /// How often a fault has acted; 0 where it left no trace.
@@ -22,6 +26,43 @@ pub(super) fn effects(lab: &Lab, record: &FaultRecord) -> u64 {
         .into_iter()
         .max()
         .unwrap_or(1)
+}
+
+/// Frames that are late by this part of the cycle cost nobody his step (SYN-31).
+const HARMLESS: f64 = 0.2;
+
+/// True if frames were late by no more than those of disturbed healthy lines, and nobody lost one or his step.
+pub(super) fn is_harmless(
+    lab: &Lab,
+    record: &FaultRecord,
+    entry: &FaultEntry,
+    cycle: Span,
+) -> bool {
+    let late_us = late_us(entry).filter(|_| {
+        matches!(record.name, FaultName::HostJitter | FaultName::LateFrames)
+            && record.frames_lost == 0
+            && lab.not_up().next().is_none()
+    });
+    late_us.is_some_and(|late_us| late_us * 1e3 < cycle.as_nanos() as f64 * JITTER.1)
+}
+
+/// Lateness of frames that a fault causes, in µs.
+fn late_us(entry: &FaultEntry) -> Option<f64> {
+    let value = ["late_us", "delay_us"].into_iter().find_map(|key| entry.parameters.get(key));
+    value.and_then(Value::as_number)
+}
+
+/// True if a fault did so little that a note is the right answer: it cost one frame at most, or made frames late where
+/// nobody keeps step, or by less than matters to whoever does.
+pub(super) fn is_bearable(record: &FaultRecord, entry: &FaultEntry, cycle: Option<Span>) -> bool {
+    if matches!(record.name, FaultName::HostJitter | FaultName::LateFrames) {
+        let late_us = late_us(entry).unwrap_or(f64::MAX);
+        let harms = |cycle: Span| late_us * 1e3 >= cycle.as_nanos() as f64 * HARMLESS;
+        return record.frames_lost == 0 && !cycle.is_some_and(harms);
+    }
+    let hits = record.symbol_errors.max(record.frames_spoiled);
+    let frames = hits.max(record.frames_lost).max(record.frames_delayed);
+    frames <= 1 && record.links_lost == 0 && record.supplies_lost == 0
 }
 
 /// Whether nothing that it did could be seen by anybody.
@@ -63,9 +104,8 @@ fn is_traceless(lab: &Lab, record: &FaultRecord) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use linesman_config::fault::FaultName;
     use linesman_proto::time::Instant;
-    use linesman_sim::segment_file::{FaultEntry, SegmentFile};
+    use linesman_sim::segment_file::SegmentFile;
 
     use super::*;
     use crate::options::LabOptions;

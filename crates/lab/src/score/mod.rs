@@ -9,6 +9,7 @@
 
 pub mod baseline;
 pub mod built_in;
+pub mod capture_probe;
 pub mod case;
 pub mod disturb;
 pub mod draw;
@@ -16,11 +17,13 @@ mod effect;
 pub mod excerpt;
 pub mod judge;
 pub mod listen;
+pub mod parts;
 pub mod perturb;
 pub mod play;
 pub mod rate;
 mod recorder;
 pub mod report;
+mod sharing;
 pub mod tally;
 mod trace;
 

@@ -5,11 +5,15 @@ use std::fmt;
 use std::str::FromStr;
 
 use linesman_config::fault::FaultName;
+use linesman_proto::time::Span;
 use linesman_sim::seed::Stream;
 use linesman_sim::segment_file::{FaultEntry, SegmentFile, Value};
 
 /// What is other than expected.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(
+    Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "kebab-case")]
 pub enum Perturbation {
     /// Cables of 1 to 100 m, whatever was planned.
     Delays,
@@ -22,12 +26,24 @@ pub enum Perturbation {
     LostReads,
     /// Another tool clears error counters now and then.
     ClearedCounters,
+    /// Controllers count as other families do: of each it is chance whether it counts forwarded errors and whether it
+    /// makes a symbol error anew when it passes a bad frame on.
+    Counting,
+    /// A link is noisy for a moment before it opens.
+    Bursts,
 }
 
 impl Perturbation {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Delays, Self::Rates, Self::Forwarded, Self::LostReads, Self::ClearedCounters];
+    pub const ALL: [Self; 7] = [
+        Self::Delays,
+        Self::Rates,
+        Self::Forwarded,
+        Self::LostReads,
+        Self::ClearedCounters,
+        Self::Counting,
+        Self::Bursts,
+    ];
 
     /// The name on the command line and in tables.
     #[must_use]
@@ -38,6 +54,8 @@ impl Perturbation {
             Self::Forwarded => "forwarded",
             Self::LostReads => "lost-reads",
             Self::ClearedCounters => "cleared-counters",
+            Self::Counting => "counting",
+            Self::Bursts => "bursts",
         }
     }
 
@@ -55,7 +73,13 @@ impl Perturbation {
                     device.counts_forwarded = Some(stream.chance(0.5));
                 }
             }
-            Self::LostReads | Self::ClearedCounters => {}
+            Self::Counting => {
+                for device in &mut file.devices {
+                    device.counts_forwarded = Some(stream.chance(0.5));
+                    device.remakes_symbol_errors = Some(stream.chance(0.5));
+                }
+            }
+            Self::LostReads | Self::ClearedCounters | Self::Bursts => {}
         }
     }
 
@@ -82,6 +106,17 @@ impl Perturbation {
                 .with("does", "clear-counters")
                 .with("frames_per_s", rate)
         })
+    }
+
+    /// Trouble at the place of a fault for a moment before the fault itself, and how long it lasts.
+    #[must_use]
+    pub fn before(self, fault: &FaultEntry, stream: &mut Stream) -> Option<(FaultEntry, Span)> {
+        let opens = ["link-open", "link-flapping", "ring-open"].contains(&fault.kind.as_str());
+        let at = fault.at.clone().filter(|_| self == Self::Bursts && opens)?;
+        let rate = stream.log_uniform(100.0, 5_000.0).round();
+        let mut entry = FaultEntry::new(FaultName::CableDegraded).with("hits_per_s", rate);
+        entry.at = Some(at);
+        Some((entry, Span::ms(stream.between(5, 200))))
     }
 
     /// The share of exchanges with counters that are not seen.
@@ -124,8 +159,13 @@ mod tests {
         for one in Perturbation::ALL {
             assert_eq!(one.name().parse(), Ok(one));
             let file = drawn(Some(one));
-            let changes_plant =
-                matches!(one, Perturbation::Delays | Perturbation::Rates | Perturbation::Forwarded);
+            let changes_plant = matches!(
+                one,
+                Perturbation::Delays
+                    | Perturbation::Rates
+                    | Perturbation::Forwarded
+                    | Perturbation::Counting
+            );
             assert_eq!(file != plain, changes_plant, "{one}");
             assert_eq!(file.devices.len(), plain.devices.len());
         }

@@ -1,5 +1,6 @@
 //! One case, played: brought up, watched while all is well, broken, judged.
 
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::fault::FaultName;
@@ -11,19 +12,21 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Stream;
-use linesman_sim::segment_file::{FaultEntry, Value};
+use linesman_sim::segment_file::{FaultEntry, SegmentFile, Value};
 use linesman_sim::truth::{FaultId, TruthLog};
+use serde::{Deserialize, Serialize};
 
-use super::baseline;
+use super::baseline::{self, CourseMethod};
 use super::built_in::{EarlyEnd, around_extra, with_built_in};
-use super::case::{Case, CaseKind, ScoreOptions};
+use super::case::{Case, CaseKind, FaultPair, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
-use super::effect::effects;
-use super::judge::{Judged, alarms, claim, judge};
+use super::effect::{effects, is_bearable, is_harmless};
+use super::judge::{Accusations, Candidates, Judged, claim, judge};
 use super::listen::{HealthyListened, Heard, Listeners};
+use super::parts::span_ns;
 use super::recorder::{SharedRecording, take_down, take_down_host};
-use crate::choice::{LineOutline, are_apart, text};
+use crate::choice::{LineOutline, are_apart, is_behind, text};
 use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
@@ -32,9 +35,9 @@ use crate::verdict::judge::JudgedFault;
 use crate::verdict::{Grade, Scene, Truth, TruthPlace, matches};
 
 /// How long the bring-up may take.
-const BRING_UP: Span = Span::s(30);
+pub(super) const BRING_UP: Span = Span::s(30);
 /// How long the line is watched while nothing is wrong.
-const CALM: Span = Span::ms(1_500);
+pub(super) const CALM: Span = Span::ms(1_500);
 /// How long a diagnosis may take after a fault is over, or has lasted its time.
 const VERDICT: Span = Span::ms(2_500);
 /// How long a line may take to come back.
@@ -49,7 +52,7 @@ const BETWEEN_PAUSES_MS: (f64, f64) = (300.0, 1_500.0);
 const ATTEMPTS: u32 = 40;
 
 /// What came of one seed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CaseReport {
     /// The seed.
     pub seed: u64,
@@ -63,24 +66,41 @@ pub struct CaseReport {
     pub forwarded: bool,
     /// Whether the card's counters were known.
     pub host_counters: bool,
-    /// What a healthy line was accused of, live and in its recording; `None` where it never was healthy.
-    pub healthy: Option<(Vec<String>, Vec<String>)>,
+    /// Findings while nothing was wrong, live and in the recording; `None` where the line never was healthy.
+    pub healthy: Option<[Accusations; 2]>,
+    /// Time in which nothing was wrong, from the start on.
+    #[serde(with = "span_ns")]
+    pub healthy_for: Span,
     /// What listeners said of it, beside a MainDevice with the habits of others.
     pub healthy_listened: Option<HealthyListened>,
     /// What listeners heard, where that is kept.
+    #[serde(skip)]
     pub heard: Vec<Heard>,
+    /// Diagnoses at the end, live and of the recording, where they are kept.
+    #[serde(skip)]
+    pub reports: Option<Box<[Diagnosis; 2]>>,
+    /// The plant, where that is kept.
+    #[serde(skip)]
+    pub plant: Option<Box<SegmentFile>>,
     /// The project of the line as TOML, where that is kept.
     pub project: Option<String>,
     /// Cycle of the process data.
+    #[serde(with = "span_ns")]
     pub cycle: Span,
+    /// Faults that were drawn for it.
+    pub drawn: Vec<FaultName>,
+    /// Relation of two faults.
+    pub pair: FaultPair,
     /// Its faults.
     pub faults: Vec<FaultOutcome>,
+    /// True if another cable had rare errors beside its fault.
+    pub has_background: bool,
     /// Why it could not be played.
-    pub unplayable: Option<String>,
+    pub unplayable: Option<Unplayable>,
 }
 
 /// What came of one fault.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FaultOutcome {
     /// What it was.
     pub name: FaultName,
@@ -92,12 +112,33 @@ pub struct FaultOutcome {
     pub live: Option<Judged>,
     /// The diagnosis of the recording.
     pub capture: Judged,
-    /// Whether the first port with a counter above zero is the place.
+    /// True if the method of a course finds the place.
     pub baseline: bool,
+    /// True if it did so little that a note is the right answer: one frame at most was lost or late, and no link.
+    pub is_bearable: bool,
+    /// True if nothing that anybody could see tells it from a line as planned.
+    pub is_unseen: bool,
     /// Whether it is the MainDevice that stops.
     pub is_pause: bool,
     /// What listeners said of it, beside a MainDevice with the habits of others.
     pub listened: Option<Listeners>,
+}
+
+/// Why a case could not be played.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+pub enum Unplayable {
+    /// None of the plants that were drawn has a place for the faults.
+    NoPlace(String),
+    /// The line did not come up, or stopped for good, though nothing was wrong yet.
+    NotUp(String),
+}
+
+impl fmt::Display for Unplayable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoPlace(why) | Self::NotUp(why) => f.write_str(why),
+        }
+    }
 }
 
 impl CaseReport {
@@ -111,17 +152,18 @@ impl CaseReport {
 /// Plays the case of a seed.
 #[must_use]
 pub fn run_case(seed: u64, options: &ScoreOptions) -> CaseReport {
-    let mut why = String::new();
+    let mut why = Unplayable::NoPlace(String::new());
     for attempt in 0..ATTEMPTS {
         let case = Case::draw(seed, attempt, options);
         match Play::new(&case, options).and_then(Play::play) {
             Ok(report) => return report,
             Err(EarlyEnd::NoPlace) => {
                 let names: Vec<&str> = case.faults.iter().map(|name| name.name()).collect();
-                why = format!("no place for {} in any plant", names.join(" and "));
+                let names = names.join(" and ");
+                why = Unplayable::NoPlace(format!("no place for {names} in any plant"));
             }
             Err(EarlyEnd::Failed(error)) => {
-                why = error;
+                why = Unplayable::NotUp(error);
                 break;
             }
         }
@@ -154,25 +196,31 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
         forwarded: case.forwarded,
         host_counters: case.host_counters,
         healthy: None,
+        healthy_for: Span::ZERO,
         healthy_listened: None,
         heard: Vec::new(),
+        reports: None,
+        plant: None,
         project: None,
         cycle: case.cycle,
+        drawn: case.faults.clone(),
+        pair: case.pair,
+        has_background: case.background.is_some(),
         faults: Vec::new(),
         unplayable: None,
     }
 }
 
 /// A fault that was put in.
-struct Active {
+pub(super) struct Active {
     id: FaultId,
-    drawn: Drawn,
+    pub(super) drawn: Drawn,
     until: Instant,
 }
 
 /// When something was first said rightly, after the first effect.
 #[derive(Clone, Copy, Default)]
-struct First {
+pub(super) struct First {
     place: Option<Span>,
     cause: Option<Span>,
 }
@@ -187,17 +235,19 @@ pub(super) struct Play<'a> {
     /// Since when the line has been up, or broken from the start.
     pub(super) up: Instant,
     /// What reads the recording.
-    recording: Arc<Mutex<Engine>>,
+    pub(super) recording: Arc<Mutex<Engine>>,
     /// Faults that are in the line from its making on.
     built_in: Vec<Drawn>,
     /// Whether the recording is judged with the project beside it.
     has_project: bool,
     /// How much goes on beside the faults of the case.
     beside: usize,
+    /// The method of a course.
+    course: CourseMethod,
 }
 
 impl<'a> Play<'a> {
-    fn new(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, EarlyEnd> {
+    pub(super) fn new(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, EarlyEnd> {
         let mut stream = case.seed.stream("score faults");
         let (file, built_in) = with_built_in(case, &mut stream)?;
         let lab_options = LabOptions {
@@ -247,6 +297,7 @@ impl<'a> Play<'a> {
             built_in,
             has_project,
             beside: 0,
+            course: CourseMethod::default(),
         })
     }
 
@@ -273,10 +324,19 @@ impl<'a> Play<'a> {
             self.up = self.lab.now();
             self.run(CALM)?;
             if self.case.kind == CaseKind::Healthy {
+                let until = self.lab.now() + self.options.healthy_for;
                 disturb(&mut self.lab, self.case.cycle, &mut self.stream)?;
+                while self.lab.now() < until {
+                    let calm = Span::us(self.stream.between(1_000_000, 120_000_000));
+                    self.lab.run_until((self.lab.now() + calm).min(until))?;
+                    disturb(&mut self.lab, self.case.cycle, &mut self.stream)?;
+                }
                 self.run(VERDICT)?;
             }
-            report.healthy = Some((alarms(&self.lab.diagnosis()), alarms(&self.recorded())));
+            self.course.clear(&self.lab);
+            report.healthy =
+                Some([self.lab.diagnosis(), self.recorded()].map(|one| Accusations::of(&one)));
+            report.healthy_for = self.lab.now().since(Instant::ZERO);
             report.healthy_listened = self.healthy_listened();
             if self.case.kind == CaseKind::Healthy {
                 if self.options.keeps_heard {
@@ -286,6 +346,7 @@ impl<'a> Play<'a> {
             }
             self.break_line(&mut active)?;
         } else {
+            self.course.clear(&self.lab);
             for (drawn, id) in std::mem::take(&mut self.built_in).into_iter().zip(0..) {
                 let until = self.lab.now() + drawn.choice.lasts;
                 // Who joins late finds the line brought up, as far as it comes.
@@ -297,8 +358,16 @@ impl<'a> Play<'a> {
         let recorded = self.recorded();
         let diagnosis = self.lab.diagnosis();
         let firsts = self.firsts(&active);
-        for (active, first) in active.iter().zip(firsts) {
-            report.faults.extend(self.outcome(active, &diagnosis, &recorded, first));
+        for (at, first) in active.iter().zip(firsts) {
+            report.faults.extend(self.outcome(at, &diagnosis, &recorded, first, [None, None]));
+        }
+        if let ([one, other], [first, second]) = (active.as_slice(), report.faults.as_mut_slice()) {
+            let pair = [(one, first), (other, second)];
+            self.each_its_own(pair, &diagnosis, &recorded);
+        }
+        if self.options.keeps_reports {
+            report.plant = Some(Box::new(self.case.file.clone()));
+            report.reports = Some(Box::new([diagnosis, recorded]));
         }
         if let (true, Some(first)) = (self.options.keeps_heard, active.first()) {
             report.heard = self.heard(self.lab.truth().fault(first.id));
@@ -306,47 +375,101 @@ impl<'a> Play<'a> {
         Ok(report)
     }
 
-    fn run(&mut self, span: Span) -> Result<(), LabError> {
+    pub(super) fn run(&mut self, span: Span) -> Result<(), LabError> {
         self.lab.run_until(self.lab.now() + span)
     }
 
-    /// Puts the faults in, one a while after the other.
-    fn break_line(&mut self, active: &mut Vec<Active>) -> Result<(), EarlyEnd> {
+    /// Puts the faults in, one a while after the other, or at one moment.
+    pub(super) fn break_line(&mut self, active: &mut Vec<Active>) -> Result<(), EarlyEnd> {
         let beside = self.options.perturb.and_then(|perturb| perturb.beside(&mut self.stream));
         if let Some(entry) = beside {
             self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
             self.beside = 1;
         }
+        let pause = Span::us(self.stream.between(0, 200_000));
+        self.run(pause)?;
+        let mut drawn: Vec<Drawn> = Vec::new();
         for name in self.case.faults.clone() {
-            let pause = Span::us(self.stream.between(0, 200_000));
-            self.run(pause)?;
-            let mut drawn = self.draw(name, active)?;
+            let mut one = self.draw(name, &drawn)?;
             if self.options.habit != Habit::Own {
-                repeat_pauses(&mut drawn.choice.entry, &mut self.case.seed.stream("score pauses"));
+                repeat_pauses(&mut one.choice.entry, &mut self.case.seed.stream("score pauses"));
             }
-            let mut entry = drawn.choice.entry.clone();
             if let Some(perturb) = self.options.perturb {
-                perturb.fault(&mut entry, &mut self.stream);
+                perturb.fault(&mut one.choice.entry, &mut self.stream);
             }
-            let until = self.lab.now() + drawn.choice.lasts;
+            drawn.push(one);
+        }
+        let hidden_until = self.part(&mut drawn);
+        self.add_background(&drawn)?;
+        for (one, hidden) in drawn.into_iter().zip(hidden_until) {
+            if !active.is_empty() {
+                self.run(self.case.pair.apart)?;
+            }
+            self.burst(&one)?;
+            let mut entry = one.choice.entry.clone();
+            let until = self.lab.now() + hidden + one.choice.lasts;
             if entry.parameters.contains_key("hits") {
                 // So many in just this time.
-                let from = self.lab.now() + Span::ms(1);
+                let from = self.lab.now() + hidden + Span::ms(1);
                 let ms = |at: Instant| at.as_nanos() as f64 / 1e6;
                 entry = entry.from_to(ms(from), Some(ms(until)));
             }
             // What chance has put together wrongly is no case.
             let id = self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
-            active.push(Active { id, drawn, until });
-            if self.case.kind == CaseKind::Double && self.stream.chance(0.5) {
-                let pause = Span::us(self.stream.between(0, 1_500_000));
-                self.run(pause)?;
-            }
+            active.push(Active { id, drawn: one, until });
         }
         Ok(())
     }
 
-    fn draw(&mut self, name: FaultName, active: &[Active]) -> Result<Drawn, EarlyEnd> {
+    /// Noise at the place of a fault shortly before it, where plants are drawn so.
+    fn burst(&mut self, drawn: &Drawn) -> Result<(), EarlyEnd> {
+        let Some(perturb) = self.options.perturb else { return Ok(()) };
+        let Some((entry, lasts)) = perturb.before(&drawn.choice.entry, &mut self.stream) else {
+            return Ok(());
+        };
+        let id = self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
+        self.run(lasts)?;
+        self.lab.heal(id);
+        Ok(())
+    }
+
+    /// Lets each of two faults be seen: an outage before the other one is healed, and the one behind it acts on
+    /// until the line is back. Gives by fault how long it is hidden.
+    fn part(&self, drawn: &mut [Drawn]) -> Vec<Span> {
+        let mut hidden = vec![Span::ZERO; drawn.len()];
+        let tree = self.lab.tree();
+        for (outage, behind) in [(0, 1), (1, 0)] {
+            let (Some(before), Some(after)) = (drawn.get(outage), drawn.get(behind)) else {
+                continue;
+            };
+            let breaks = matches!(before.choice.name, FaultName::LinkOpen | FaultName::DeviceOff);
+            if breaks && is_behind(tree, &after.choice, &before.choice) {
+                hidden[behind] = before.choice.lasts + self.case.pair.apart + RECOVERY;
+                drawn[outage].ends = Ends::Healed;
+            }
+        }
+        hidden
+    }
+
+    /// Errors that are too rare to matter, on a cable that has none of the faults.
+    fn add_background(&mut self, drawn: &[Drawn]) -> Result<(), EarlyEnd> {
+        let Some(rate) = self.case.background else { return Ok(()) };
+        let segment = self.lab.segment();
+        let cabled = cabled(segment);
+        let names: Vec<String> = segment.devices().map(|id| segment.name(id).to_owned()).collect();
+        let outline = LineOutline { tree: segment.tree(), names: &names, cabled: &cabled };
+        let choice = outline.choose(FaultName::CableDegraded, &mut self.stream);
+        let Some(choice) = choice else { return Ok(()) };
+        if drawn.iter().any(|one| one.choice.link == choice.link) {
+            return Ok(());
+        }
+        let entry = choice.entry.with("hits_per_s", (rate * 100.0).round() / 100.0);
+        self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
+        self.beside += 1;
+        Ok(())
+    }
+
+    fn draw(&mut self, name: FaultName, others: &[Drawn]) -> Result<Drawn, EarlyEnd> {
         let segment = self.lab.segment();
         let names: Vec<String> = segment.devices().map(|id| segment.name(id).to_owned()).collect();
         let cabled = cabled(segment);
@@ -368,9 +491,16 @@ impl<'a> Play<'a> {
         };
         for _ in 0..10 {
             let drawn = draw(name, &offer, &mut self.stream);
-            // One of two faults must not hide the other.
+            let is_in_line = self.case.pair.is_in_line;
             let fits = |drawn: &Drawn| {
-                active.iter().all(|one| are_apart(outline.tree, &one.drawn.choice, &drawn.choice))
+                let (tree, new) = (outline.tree, &drawn.choice);
+                others.iter().all(|other| {
+                    let other = &other.choice;
+                    match is_in_line {
+                        true => is_behind(tree, new, other) || is_behind(tree, other, new),
+                        false => are_apart(tree, other, new),
+                    }
+                })
             };
             if let Some(drawn) = drawn.filter(fits) {
                 return Ok(drawn);
@@ -380,7 +510,7 @@ impl<'a> Play<'a> {
     }
 
     /// Lets the faults act, end, and be seen.
-    fn wait(&mut self, active: &mut [Active]) -> Result<(), EarlyEnd> {
+    pub(super) fn wait(&mut self, active: &mut [Active]) -> Result<(), EarlyEnd> {
         let mut order: Vec<usize> = (0..active.len()).collect();
         order.sort_by_key(|index| active[*index].until);
         for index in order {
@@ -461,7 +591,7 @@ impl<'a> Play<'a> {
         active.iter().map(of).collect()
     }
 
-    fn truth(&self, active: &Active) -> Option<Truth> {
+    pub(super) fn truth(&self, active: &Active) -> Option<Truth> {
         let mut truth = self.lab.truth_of(active.id)?;
         // A contact that opened once is an opened link, whatever it would have done next.
         if truth.name == FaultName::LinkFlapping && truth.opened_once() && truth.signals_lost > 0 {
@@ -491,14 +621,16 @@ impl<'a> Play<'a> {
         })
     }
 
-    fn outcome(
+    pub(super) fn outcome(
         &self,
         active: &Active,
         live: &Diagnosis,
         recorded: &Diagnosis,
         first: First,
+        [taken_live, taken_recorded]: [Option<&str>; 2],
     ) -> Option<FaultOutcome> {
         let record = self.lab.truth().fault(active.id)?;
+        let entry = &active.drawn.choice.entry;
         let truth = self.truth(active)?;
         let all: Vec<Truth> = self
             .lab
@@ -513,13 +645,14 @@ impl<'a> Play<'a> {
         let host_counters = self.case.host_counters;
         let scene = Scene { tree, host_counters, answered_again };
         let context = JudgedFault::of(self.lab.truth(), record);
-        let when = (context, self.case.faults.len().max(1) + self.beside);
+        let among = self.case.faults.len().max(1) + self.beside;
+        let when = |taken| Candidates { context, among, taken };
         let cycle = self.case.cycle.as_nanos().max(1);
         let cycles = first.place.map(|after| after.as_nanos().div_ceil(cycle));
         let live = self.options.judges_live().then(|| Judged {
             cycles,
             named_after: first.cause,
-            ..judge(live, &truth, &all, &scene, when, &|id| id)
+            ..judge(live, &truth, &all, &scene, when(taken_live), &|id| id)
         });
         let by_position = |id: DeviceId| self.lab.of_plan(id);
         let as_planned = |id: DeviceId| id;
@@ -527,8 +660,8 @@ impl<'a> Play<'a> {
             if self.has_project { &as_planned } else { &by_position };
         let heard_scene = scene;
         let scene = Scene { host_counters: false, ..scene };
-        let capture = judge(recorded, &truth, &all, &scene, when, naming);
-        let baseline = baseline::first_counter(&self.lab);
+        let capture = judge(recorded, &truth, &all, &scene, when(taken_recorded), naming);
+        let baseline = self.course.place(&self.lab);
         let is_pause = truth.name == FaultName::WatchdogStarved
             && truth.places.iter().any(|place| matches!(place, TruthPlace::Host(_)));
         let is_single = self.case.faults.len() + self.beside == 1;
@@ -537,10 +670,15 @@ impl<'a> Play<'a> {
         Some(FaultOutcome {
             name: truth.name,
             entry: text(&active.drawn.choice.entry),
-            effects: effects(&self.lab, record),
+            effects: match is_harmless(&self.lab, record, entry, self.case.cycle) {
+                true => 0,
+                false => effects(&self.lab, record),
+            },
             live,
             capture,
             baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
+            is_bearable: is_bearable(record, entry, self.case.clocks.then_some(self.case.cycle)),
+            is_unseen: truth.unseen.is_some(),
             is_pause,
             listened,
         })

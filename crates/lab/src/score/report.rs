@@ -1,4 +1,4 @@
-//! The score as programs read it, `linesman.score/1`.
+//! The score as programs read it, `linesman.score/2`.
 
 use std::collections::BTreeMap;
 
@@ -9,14 +9,14 @@ use super::listen::report::ListenedReport;
 use super::rate::Rate;
 
 /// Name and version of the format.
-pub const SCHEMA: &str = "linesman.score/1";
+pub const SCHEMA: &str = "linesman.score/2";
 
 /// A whole score. What is said first of a case with one fault is held against the truth; a case
 /// counts when the truth log shows an effect, whether or not it was seen.
 #[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScoreReport {
-    /// `linesman.score/1`.
+    /// `linesman.score/2`.
     pub schema: String,
     /// Name and version of the program.
     pub tool: String,
@@ -42,11 +42,13 @@ pub struct ScoreReport {
     pub place_at_1_set: f64,
     /// The same, counting causes that no evidence can tell apart.
     pub cause_at_1_set: f64,
+    /// Single faults: share that is mended by an exchange of the part that the first finding blames.
+    pub repair_at_1: f64,
     /// Runs, or beginnings of runs, in which nothing was wrong.
     pub healthy_runs: u64,
-    /// Those of them with a warning or an error.
+    /// Those of them in which something was said, be it a note; and lines that did not come up.
     pub false_alarms: u64,
-    /// What a course teaches: the first port with a counter above zero.
+    /// Method of a course: clear the counters, watch, look who is missing, who counts first, and who is not in OP.
     pub baseline: Baseline,
     /// To say nothing.
     pub no_diagnosis: Baseline,
@@ -62,6 +64,10 @@ pub struct ScoreReport {
     pub without_card_counters: GroupReport,
     /// Single faults in rings.
     pub rings: GroupReport,
+    /// Single faults beside rare errors of another cable.
+    pub beside_background: GroupReport,
+    /// Faults that are in none of the figures, by name.
+    pub left_out: BTreeMap<String, LeftOut>,
     /// Runs in which nothing was wrong.
     pub healthy: HealthyReport,
     /// Single faults by the number of their effects.
@@ -101,7 +107,7 @@ pub struct GroupReport {
     pub live: Option<SideReport>,
     /// The diagnosis of the recordings alone.
     pub capture: SideReport,
-    /// The first port with a counter above zero.
+    /// The method of a course.
     pub baseline: Rate,
 }
 
@@ -117,6 +123,10 @@ pub struct SideReport {
     pub place_at_1_set: Rate,
     /// Cause and place are right or admitted.
     pub cause_at_1_set: Rate,
+    /// The exchange of the part that the first finding blames mends it.
+    pub repair_at_1: Rate,
+    /// Faults that did harm, of which a note was all that was said: they count as not found.
+    pub notes_instead: u64,
     /// Warnings and errors that nothing explains.
     pub other_findings: u64,
     /// Cycles from the first effect to the first finding at the right place: half of them took no
@@ -138,18 +148,62 @@ pub struct DoubleReport {
     pub both_places_capture: Rate,
     /// Both causes, by the recordings alone.
     pub both_causes_capture: Rate,
+    /// One behind the other, live.
+    pub in_line: PairRates,
+    /// On different branches, live.
+    pub on_branches: PairRates,
+    /// Begun at one moment, live.
+    pub at_one_moment: PairRates,
+    /// Begun one after the other, live.
+    pub one_after_the_other: PairRates,
     /// Each fault by itself.
     pub faults: GroupReport,
+}
+
+/// Pairs of faults of which each has a finding of its own.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PairRates {
+    /// Both places are right or admitted.
+    pub both_places: Rate,
+    /// Both causes are right or admitted.
+    pub both_causes: Rate,
+}
+
+/// Faults of one name that are in none of the figures.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeftOut {
+    /// The truth log shows no effect.
+    pub no_effect: u64,
+    /// Nothing that anybody can see tells the line from the planned one.
+    pub unseen: u64,
+    /// It acted, and the other one of two did not: two findings were looked at, and it is no single fault.
+    pub alone_of_two: u64,
+    /// No plant that was drawn has a place for it.
+    pub no_place: u64,
+    /// The line did not come up before anything was wrong; that counts as a false alarm.
+    pub not_up: u64,
 }
 
 /// Runs in which nothing was wrong.
 #[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HealthyReport {
-    /// Without warning or error, live.
+    /// Without any finding, notes included, live.
     pub silent: Rate,
-    /// Without warning or error, by the recordings alone.
+    /// Without any finding, by the recordings alone.
     pub silent_capture: Rate,
+    /// Time in which nothing was wrong, of all lines together, in hours.
+    pub line_hours: f64,
+    /// Findings in that time, notes included, live.
+    pub findings: u64,
+    /// Findings by the recordings alone.
+    pub findings_capture: u64,
+    /// Findings in a thousand hours, live.
+    pub per_1000_hours: Option<f64>,
+    /// Upper end of the 95 % interval of that.
+    pub per_1000_hours_at_most: Option<f64>,
     /// What they were accused of.
     pub alarms: Vec<String>,
 }

@@ -8,14 +8,14 @@ use linesman_proto::time::Span;
 use super::case::{CaseKind, ScoreOptions};
 use super::judge::Judged;
 use super::listen::tally::ListenTally;
-use super::play::{CaseReport, FaultOutcome};
+use super::play::{CaseReport, FaultOutcome, Unplayable};
 use super::rate::{Count, rounded};
 use super::report::{
-    Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, SCHEMA, ScoreReport,
-    SideReport, WrongReport,
+    Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, LeftOut, PairRates, SCHEMA,
+    ScoreReport, SideReport, WrongReport,
 };
 use crate::habit::Habit;
-use crate::verdict::Grade;
+use crate::verdict::{Grade, Match};
 
 /// Bins of confidence.
 const BINS: usize = 10;
@@ -45,13 +45,17 @@ struct Side {
     cause: Count,
     place_set: Count,
     cause_set: Count,
+    repair: Count,
+    notes: u64,
     others: u64,
     cycles: Vec<u64>,
 }
 
 impl Side {
-    fn add(&mut self, judged: &Judged) {
-        let fits = judged.fits;
+    fn add(&mut self, fault: &FaultOutcome, judged: &Judged) {
+        let fits = held(fault, judged);
+        self.notes += u64::from(!is_answer(fault, judged));
+        self.repair.add(judged.is_repaired && is_answer(fault, judged));
         self.place.add(fits.place == Grade::Exact);
         self.cause.add(fits.cause == Grade::Exact);
         self.place_set.add(fits.place.is_right());
@@ -72,6 +76,8 @@ impl Side {
             cause_at_1: self.cause.rate(),
             place_at_1_set: self.place_set.rate(),
             cause_at_1_set: self.cause_set.rate(),
+            repair_at_1: self.repair.rate(),
+            notes_instead: self.notes,
             other_findings: self.others,
             cycles_median: at(0.5),
             cycles_95: at(0.95),
@@ -92,9 +98,9 @@ impl Group {
     fn add(&mut self, fault: &FaultOutcome) {
         self.faults += 1;
         if let Some(live) = &fault.live {
-            self.live.add(live);
+            self.live.add(fault, live);
         }
-        self.capture.add(&fault.capture);
+        self.capture.add(fault, &fault.capture);
         self.baseline.add(fault.baseline);
     }
 
@@ -108,6 +114,16 @@ impl Group {
     }
 }
 
+/// Fit of the answer to a fault: a note that something is worth knowing is no answer where something is wrong.
+fn held(fault: &FaultOutcome, judged: &Judged) -> Match {
+    if is_answer(fault, judged) { judged.fits } else { Match::NONE }
+}
+
+/// False for a note where something is wrong.
+const fn is_answer(fault: &FaultOutcome, judged: &Judged) -> bool {
+    fault.is_bearable || !judged.is_note
+}
+
 /// Both faults of a case.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pairs {
@@ -116,9 +132,16 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn add<'a>(&mut self, judged: impl Iterator<Item = &'a Judged> + Clone) {
-        self.places.add(judged.clone().all(|one| one.fits.place.is_right()));
-        self.causes.add(judged.clone().all(|one| one.fits.cause.is_right()));
+    fn add(&mut self, fits: &[Match]) {
+        if fits.is_empty() {
+            return;
+        }
+        self.places.add(fits.iter().all(|one| one.place.is_right()));
+        self.causes.add(fits.iter().all(|one| one.cause.is_right()));
+    }
+
+    fn report(self) -> PairRates {
+        PairRates { both_places: self.places.rate(), both_causes: self.causes.rate() }
     }
 }
 
@@ -137,8 +160,11 @@ pub struct Tally {
     cases: u64,
     effective: u64,
     unplayable: Vec<String>,
+    left_out: BTreeMap<String, LeftOut>,
     healthy: Count,
     healthy_capture: Count,
+    healthy_for: Span,
+    findings_of_healthy: [u64; 2],
     alarms: Vec<String>,
     single: Group,
     masked: Group,
@@ -148,6 +174,8 @@ pub struct Tally {
     double: Group,
     pairs: Pairs,
     pairs_capture: Pairs,
+    pairs_by_kind: [Pairs; 4],
+    background: Group,
     by_effects: [Group; EFFECTS.len()],
     per_fault: BTreeMap<FaultName, Group>,
     confidence: [Confidence; BINS],
@@ -170,21 +198,52 @@ impl Tally {
         self.cases += 1;
         if let Some(why) = &case.unplayable {
             self.unplayable.push(format!("seed {}: {why}", case.seed));
+            for name in &case.drawn {
+                let left_out = self.left_out.entry(name.name().to_owned()).or_default();
+                match why {
+                    Unplayable::NoPlace(_) => left_out.no_place += 1,
+                    Unplayable::NotUp(_) => left_out.not_up += 1,
+                }
+            }
+            // Nobody can be judged by a line that does not come up, and nobody may leave it out.
+            if matches!(why, Unplayable::NotUp(_)) {
+                self.healthy.add(false);
+            }
         }
-        if let Some((live, capture)) = &case.healthy {
-            let visibility = if self.options.judges_live() { live } else { capture };
-            self.healthy.add(visibility.is_empty());
-            self.healthy_capture.add(capture.is_empty());
-            for alarm in visibility {
+        if let Some([live, capture]) = &case.healthy {
+            let said = if self.options.judges_live() { live } else { capture };
+            self.healthy.add(said.is_silent());
+            self.healthy_capture.add(capture.is_silent());
+            self.healthy_for += case.healthy_for;
+            for (sum, one) in self.findings_of_healthy.iter_mut().zip([said, capture]) {
+                *sum += (one.alarms.len() + one.notes.len()) as u64;
+            }
+            for alarm in said.alarms.iter().chain(&said.notes) {
                 self.alarms.push(format!("seed {}: {alarm}", case.seed));
             }
         }
         self.listened.add_healthy(case);
-        let acted: Vec<&FaultOutcome> = case.faults.iter().filter(|one| one.effects > 0).collect();
+        for fault in &case.faults {
+            let left_out = self.left_out.entry(fault.name.name().to_owned()).or_default();
+            left_out.no_effect += u64::from(fault.effects == 0);
+            left_out.unseen += u64::from(fault.effects > 0 && fault.is_unseen);
+        }
+        let acted: Vec<&FaultOutcome> =
+            case.faults.iter().filter(|one| one.effects > 0 && !one.is_unseen).collect();
         self.effective += u64::from(!acted.is_empty());
         if case.kind == CaseKind::Double && acted.len() == 2 {
-            self.pairs.add(acted.iter().filter_map(|one| one.live.as_ref()));
-            self.pairs_capture.add(acted.iter().map(|one| &one.capture));
+            let live: Vec<Match> =
+                acted.iter().filter_map(|one| Some(held(one, one.live.as_ref()?))).collect();
+            let capture: Vec<Match> = acted.iter().map(|one| held(one, &one.capture)).collect();
+            self.pairs.add(&live);
+            self.pairs_capture.add(&capture);
+            let first = if live.is_empty() { &capture } else { &live };
+            let pair = case.pair;
+            let is_together = pair.apart == Span::ZERO;
+            let kinds = [pair.is_in_line, !pair.is_in_line, is_together, !is_together];
+            for (pairs, is_so) in self.pairs_by_kind.iter_mut().zip(kinds) {
+                pairs.add(if is_so { first } else { &[] });
+            }
             for fault in acted {
                 self.double.add(fault);
                 self.note_wrong(case, fault);
@@ -193,6 +252,9 @@ impl Tally {
         }
         // With one of two faults that did nothing, two findings were looked at: it is no single one.
         if case.kind == CaseKind::Double {
+            for fault in acted {
+                self.left_out.entry(fault.name.name().to_owned()).or_default().alone_of_two += 1;
+            }
             return;
         }
         for fault in acted {
@@ -215,6 +277,9 @@ impl Tally {
         if !case.host_counters {
             self.without_card.add(fault);
         }
+        if case.has_background {
+            self.background.add(fault);
+        }
         let of_effects = EFFECTS.iter().position(|(_, most)| fault.effects <= *most);
         if let Some(group) = of_effects.and_then(|at| self.by_effects.get_mut(at)) {
             group.add(fault);
@@ -223,7 +288,7 @@ impl Tally {
         let judged = fault.live.as_ref().unwrap_or(&fault.capture);
         if !judged.said.is_empty() {
             let bin = ((judged.confidence * BINS as f64) as usize).min(BINS - 1);
-            self.confidence[bin].count.add(judged.fits.cause == Grade::Exact);
+            self.confidence[bin].count.add(held(fault, judged).cause == Grade::Exact);
             self.confidence[bin].sum += judged.confidence;
         }
         if case.cycle == FAST_CYCLE && HARD.contains(&fault.name) && fault.live.is_some() {
@@ -235,8 +300,7 @@ impl Tally {
 
     fn note_wrong(&mut self, case: &CaseReport, fault: &FaultOutcome) {
         let live = fault.live.as_ref();
-        let is_right =
-            |judged: &Judged| judged.fits.cause.is_right() && judged.fits.place.is_right();
+        let is_right = |judged: &Judged| held(fault, judged).is_right();
         let is_all_right = live.is_none_or(is_right) && is_right(&fault.capture);
         let has_others = live.is_some_and(|judged| judged.others > 0);
         if (is_all_right && !has_others) || self.wrong.len() >= MOST_WRONG {
@@ -248,8 +312,8 @@ impl Tally {
             ring: case.is_ring,
             fault: fault.entry.clone(),
             effects: fault.effects,
-            live: live.map(verdict),
-            capture: verdict(&fault.capture),
+            live: live.map(|judged| verdict(fault, judged)),
+            capture: verdict(fault, &fault.capture),
             findings: live.unwrap_or(&fault.capture).findings.iter().take(12).cloned().collect(),
         });
     }
@@ -265,6 +329,7 @@ impl Tally {
         });
         let bins: Vec<Bin> = bins.collect();
         let (healthy, healthy_capture) = (self.healthy.rate(), self.healthy_capture.rate());
+        let hours = self.healthy_for.as_nanos() as f64 / 3.6e12;
         ScoreReport {
             schema: SCHEMA.to_owned(),
             tool: concat!("linesman ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -281,6 +346,7 @@ impl Tally {
             cause_at_1_set: first.cause_at_1_set.share,
             healthy_runs: healthy.of,
             false_alarms: healthy.of - healthy.right,
+            repair_at_1: first.repair_at_1.share,
             baseline: Baseline { place_at_1: single.baseline.share },
             no_diagnosis: Baseline { place_at_1: 0.0 },
             single,
@@ -289,15 +355,31 @@ impl Tally {
                 both_causes: self.pairs.causes.rate(),
                 both_places_capture: self.pairs_capture.places.rate(),
                 both_causes_capture: self.pairs_capture.causes.rate(),
+                in_line: self.pairs_by_kind[0].report(),
+                on_branches: self.pairs_by_kind[1].report(),
+                at_one_moment: self.pairs_by_kind[2].report(),
+                one_after_the_other: self.pairs_by_kind[3].report(),
                 faults: self.double.report(),
             },
             masked: self.masked.report(),
             without_forwarded: self.without_forwarded.report(),
             without_card_counters: self.without_card.report(),
             rings: self.rings.report(),
+            beside_background: self.background.report(),
+            left_out: self
+                .left_out
+                .iter()
+                .filter(|(_, left_out)| **left_out != LeftOut::default())
+                .map(|(name, left_out)| (name.clone(), *left_out))
+                .collect(),
             healthy: HealthyReport {
                 silent: healthy,
                 silent_capture: healthy_capture,
+                line_hours: rounded(hours),
+                findings: self.findings_of_healthy[0],
+                findings_capture: self.findings_of_healthy[1],
+                per_1000_hours: per_1000_hours(self.findings_of_healthy[0] as f64, hours),
+                per_1000_hours_at_most: per_1000_hours(at_most(self.findings_of_healthy[0]), hours),
                 alarms: self.alarms.clone(),
             },
             by_effects: EFFECTS
@@ -328,21 +410,34 @@ impl Tally {
     }
 }
 
+/// Rate in a thousand hours.
+fn per_1000_hours(count: f64, hours: f64) -> Option<f64> {
+    (hours > 0.0).then(|| rounded(count * 1_000.0 / hours))
+}
+
+/// Upper end of the 95 % interval of a number that is counted (Poisson, one-sided), by the approximation of Byar.
+fn at_most(count: u64) -> f64 {
+    let n = count as f64 + 1.0;
+    n * (1.0 - 1.0 / (9.0 * n) + 1.645 / (3.0 * n.sqrt())).powi(3)
+}
+
 /// The expected calibration error: how far share and confidence are apart in each bin, weighted by
 /// its findings.
 fn calibration_error(bins: &[Bin]) -> f64 {
     let all: u64 = bins.iter().map(|bin| bin.right.of).sum();
     let apart =
         bins.iter().map(|bin| (bin.confidence - bin.right.share).abs() * bin.right.of as f64);
-    rounded(apart.sum::<f64>() / (all.max(1)) as f64)
+    // The sum of nothing is a negative zero.
+    rounded(apart.sum::<f64>().abs() / (all.max(1)) as f64)
 }
 
 /// What was said, and how well it fits.
-fn verdict(judged: &Judged) -> String {
-    let fits = judged.fits;
+fn verdict(fault: &FaultOutcome, judged: &Judged) -> String {
+    let fits = held(fault, judged);
     let mark = match (fits.place.is_right(), fits.cause.is_right()) {
         (true, true) => "right",
         (true, false) => "wrong cause",
+        (false, _) if judged.is_note && judged.fits.place.is_right() => "a note only",
         (false, _) => "wrong place",
     };
     let said = if judged.said.is_empty() { "nothing" } else { &judged.said };

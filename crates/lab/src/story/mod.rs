@@ -33,11 +33,12 @@
 pub mod assertion;
 pub mod object;
 pub mod parse;
+mod place;
 pub mod run;
 mod segment_probe;
 pub mod step;
 
 pub use assertion::Assertion;
-pub use parse::{FrontMatter, SegmentText, Story, StoryError};
+pub use parse::{Asserts, FrontMatter, SegmentText, Story, StoryError};
 pub use run::{StepReport, StoryReport, exit_status, play};
 pub use step::{Expectation, Heal, Step, StepAt, What};

@@ -3,7 +3,7 @@
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
-use super::step::{self, StepAt};
+use super::step::{self, Step, StepAt};
 use crate::habit::Habit;
 
 /// A story.
@@ -40,6 +40,8 @@ pub struct FrontMatter {
     pub project: bool,
     /// How the MainDevice drives the line.
     pub habit: Habit,
+    /// Subject of its expectations.
+    pub asserts: Asserts,
     /// Segment file to read when there is no TOML block.
     pub segment: Option<String>,
 }
@@ -56,9 +58,19 @@ impl Default for FrontMatter {
             host_counters: true,
             project: true,
             habit: Habit::Own,
+            asserts: Asserts::Diagnosis,
             segment: None,
         }
     }
+}
+
+/// Subject of the expectations of a story.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Asserts {
+    /// The diagnosis, and what it rests on.
+    Diagnosis,
+    /// The segment alone: what a fault leaves in counters, links, states and frames.
+    Segment,
 }
 
 /// Where the segment file is.
@@ -141,7 +153,28 @@ impl Story {
                 "no steps: write them as list items, `- expect healthy`",
             ));
         }
+        asserts_what_it_says(front.asserts, &steps)?;
         Ok(Self { front, segment, choices, steps })
+    }
+}
+
+/// A story of the segment alone expects something of it, and nothing of the diagnosis.
+fn asserts_what_it_says(asserts: Asserts, steps: &[StepAt]) -> Result<(), StoryError> {
+    let mut expectations = steps.iter().filter_map(|step| {
+        if let Step::Expect { what, .. } = &step.step { Some((step.line, what)) } else { None }
+    });
+    match asserts {
+        Asserts::Diagnosis => Ok(()),
+        Asserts::Segment => match expectations.clone().find(|(_, what)| !what.is_of_segment()) {
+            Some((line, _)) => {
+                let what = "it expects something of the diagnosis, and the front matter says `asserts: segment`";
+                Err(StoryError::Line { line, what: what.to_owned() })
+            }
+            None if expectations.next().is_none() => Err(StoryError::Whole(
+                "`asserts: segment`, but no step expects anything of the segment",
+            )),
+            None => Ok(()),
+        },
     }
 }
 
@@ -197,11 +230,18 @@ fn entry(front: &mut FrontMatter, text: &str) -> Result<(), String> {
         "host-counters" => front.host_counters = yes(value)?,
         "project" => front.project = yes(value)?,
         "habit" => front.habit = value.parse()?,
+        "asserts" => {
+            front.asserts = match value {
+                "diagnosis" => Asserts::Diagnosis,
+                "segment" => Asserts::Segment,
+                other => return Err(format!("`{other}`: expected diagnosis or segment")),
+            };
+        }
         "segment" => front.segment = Some(value.to_owned()),
         other => {
             return Err(format!(
                 "`{other}` is no key of a story: expected title, proves, findings, seed, cycle, \
-                 target, host-counters, project, habit or segment"
+                 target, host-counters, project, habit, asserts or segment"
             ));
         }
     }
@@ -248,6 +288,22 @@ mod tests {
         assert_eq!(steps, [(12, Some(Span::s(1))), (15, None)]);
         let exit = Step::Expect { what: Expectation::Exit(0), within: Span::ZERO };
         assert_eq!(story.steps[1].step, exit);
+    }
+
+    #[test]
+    fn story_of_the_segment_alone_expects_nothing_of_the_diagnosis() {
+        let text = STORY.replace("cycle: 4 ms\n", "asserts: segment\n");
+        let error = Story::parse(&text).unwrap_err().to_string();
+        assert!(error.contains("line 12: it expects something of the diagnosis"), "{error}");
+        let of_segment = text.replace("expect healthy", "expect answered");
+        let error = Story::parse(&of_segment).unwrap_err().to_string();
+        assert!(error.contains("line 15"), "what it exits with, too: {error}");
+        let of_segment = of_segment.replace("- expect exit 0\n", "");
+        assert_eq!(Story::parse(&of_segment).unwrap().front.asserts, Asserts::Segment);
+        let nothing = of_segment.replace("- at 1 s expect answered", "- at 1 s heal");
+        assert!(Story::parse(&nothing).unwrap_err().to_string().contains("no step expects"));
+        let other = text.replace("asserts: segment", "asserts: all");
+        assert!(Story::parse(&other).unwrap_err().to_string().contains("`all`"));
     }
 
     #[test]

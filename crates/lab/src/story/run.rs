@@ -2,17 +2,16 @@
 
 use std::fmt;
 
-use linesman_config::attachment::Attachment;
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, FindingState, Severity, Verdict};
-use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::SYSTEM_TIME;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::End;
 use linesman_sim::segment_file::{DescriptionFiles, FaultEntry, SegmentFile};
 use linesman_sim::truth::{FaultId, FaultRecord};
 
 use super::parse::{SegmentText, Story};
+use super::place;
 use super::segment_probe::SegmentProbe;
 use super::step::{Expectation, Heal, Step, StepAt, What, Written};
 use crate::lab::Lab;
@@ -221,7 +220,7 @@ impl StoryRun {
         value: &Written,
     ) -> Result<(), String> {
         let known = |story_run: &Self, name: &str| {
-            let id = story_run.device(name);
+            let id = place::device(&story_run.lab, name);
             id.ok_or_else(|| format!("no SubDevice of this line is called `{name}`"))
         };
         let bytes = match value {
@@ -261,7 +260,7 @@ impl StoryRun {
             self.segment_probe.names(&self.lab, assertion);
         }
         if let Expectation::Object(reading) = what {
-            let id = self.device(&reading.device);
+            let id = place::device(&self.lab, &reading.device);
             let name = &reading.device;
             let id = id.ok_or_else(|| format!("no SubDevice of this line is called `{name}`"))?;
             return reading.check(id, &mut self.lab);
@@ -275,55 +274,14 @@ impl StoryRun {
     }
 
     fn resolve<'a>(&self, what: &'a Expectation) -> Result<Resolved<'a>, String> {
-        let site = if let Expectation::Finding { place: Some(place), .. } = what {
-            Some(self.site(place)?)
+        let site = if let Expectation::Finding { place: Some(place), .. }
+        | Expectation::Candidate { place, .. } = what
+        {
+            Some(place::site(&self.lab, place)?)
         } else {
             None
         };
         Ok(Resolved { what, site })
-    }
-
-    /// The place that a text names.
-    fn site(&self, text: &str) -> Result<Site, String> {
-        let unknown = |name: &str| format!("no SubDevice of this line is called `{name}`");
-        match text {
-            "host" => return Ok(Site::Host),
-            "network" => return Ok(Site::Network),
-            _ => {}
-        }
-        if let Some(name) = text.strip_prefix("device ") {
-            return self.device(name).map(Site::Device).ok_or_else(|| unknown(name));
-        }
-        let tree = self.lab.tree();
-        // Names may hold `-`, so every way of parting the text is tried.
-        for (at, separator) in text.match_indices(['>', '-']) {
-            let (one, other) = (&text[..at], &text[at + 1..]);
-            if let (Some(one), Some(other)) = (self.end(one), self.end(other)) {
-                return Ok(match separator {
-                    ">" => Site::hop(tree, one, other),
-                    _ => Site::link(tree, one, other),
-                });
-            }
-        }
-        Err(format!(
-            "`{text}` is no place of this line: expected `K1.C-B3.A`, `K1.C>B3.A`, `device K1`, \
-             `host` or `network`"
-        ))
-    }
-
-    fn end(&self, text: &str) -> Option<End<DeviceId>> {
-        match text.parse().ok()? {
-            Attachment::MainDevice(path) => Some(End::MainDevice(path)),
-            Attachment::Device { name, port } => {
-                self.device(&name).map(|id| End::Controller(id, port))
-            }
-        }
-    }
-
-    fn device(&self, name: &str) -> Option<DeviceId> {
-        let names = self.lab.project().devices.iter();
-        let at = names.into_iter().position(|device| device.name == name)?;
-        Some(DeviceId(at as u32))
     }
 }
 
@@ -347,6 +305,16 @@ fn holds(resolved: &Resolved<'_>, lab: &Lab, segment_probe: &SegmentProbe) -> Re
             };
             let expected = format!("a finding {}{}", named(what), at(place.as_deref()));
             check(diagnosis.findings.iter().any(fits), &expected)
+        }
+        Expectation::Candidate { cause, place } => {
+            let fits = |claim: Claim| {
+                claim.cause == *cause
+                    && resolved.site.is_some_and(|wanted| wanted.covers(claim.site))
+            };
+            let claims =
+                |finding| std::iter::once(Claim::of(finding)).chain(Claim::alternatives(finding));
+            let expected = format!("a finding that may be {cause}{}", at(Some(place)));
+            check(diagnosis.findings.iter().flat_map(claims).any(fits), &expected)
         }
         Expectation::Verdict(on) => verdict(*on, lab, &diagnosis),
         Expectation::NoFinding(None) => check(real().next().is_none(), "no finding"),

@@ -130,6 +130,13 @@ pub enum Expectation {
         /// The text of its place, if that matters.
         place: Option<String>,
     },
+    /// There is a finding, not a consequence of another, that has this cause at this place first or among what else it may be.
+    Candidate {
+        /// The cause.
+        cause: FaultName,
+        /// The text of its place.
+        place: String,
+    },
     /// There is none such, nor has there been one.
     NoFinding(Option<What>),
     /// There have been this many findings, consequences not counted.
@@ -276,6 +283,11 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             let place = words.take("at").then(|| std::mem::take(&mut words.rest).to_owned());
             Expectation::Finding { what, place }
         }
+        "candidate" => {
+            let cause = fault(words.next())?;
+            words.expect("at")?;
+            Expectation::Candidate { cause, place: std::mem::take(&mut words.rest).to_owned() }
+        }
         "verdict" => {
             let on = words.take("on").then(|| fault(words.next())).transpose()?;
             Expectation::Verdict(on)
@@ -313,7 +325,7 @@ fn expect(words: &mut Words<'_>) -> Result<Step, String> {
             }
             let count = other.parse().map_err(|_| {
                 format!(
-                    "`{other}` cannot be expected: expected `verdict`, `finding`, `no finding`, `N findings`, \
+                    "`{other}` cannot be expected: expected `verdict`, `finding`, `candidate`, `no finding`, `N findings`, \
                      `healthy`, `inconclusive`, `all closed`, `line up`, `exit N`, `log \"…\"`, or something of the \
                      segment: `counter`, `no other counter`, `port`, `state`, `lost frames`, \
                      `answered`, `unanswered`, `working counter`, `reached`, `carrier`, `register`, `clock`, `object`"
@@ -348,6 +360,14 @@ fn named(word: &str) -> Result<What, String> {
 
 fn fault(word: &str) -> Result<FaultName, String> {
     word.parse().map_err(|error: linesman_config::fault::UnknownFault| error.to_string())
+}
+
+impl Expectation {
+    /// It is about the segment itself, whatever the diagnosis says of it.
+    #[must_use]
+    pub const fn is_of_segment(&self) -> bool {
+        matches!(self, Self::Assertion(_) | Self::Object(_) | Self::Log { .. } | Self::LineUp)
+    }
 }
 
 /// The rest of a step, word by word.

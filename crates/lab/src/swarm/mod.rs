@@ -14,4 +14,4 @@ pub mod run;
 
 pub use episode::{EpisodeReport, FaultOutcome};
 pub use physics::{PhysicsReport, run_physics_seed};
-pub use run::{SeedReport, SwarmOptions, SwarmReport, run_seed, swarm};
+pub use run::{SeedReport, SeedSum, SwarmOptions, SwarmPart, SwarmReport, run_seed};

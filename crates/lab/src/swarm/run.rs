@@ -1,7 +1,6 @@
 //! One seed, and many of them.
 
 use std::fmt;
-use std::ops::Range;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
@@ -10,11 +9,13 @@ use linesman_sim::hardware::PortKind;
 use linesman_sim::seed::Seed;
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::{PlantOptions, SegmentFile, plant};
+use serde::{Deserialize, Serialize};
 
 use super::episode::{Episode, EpisodeReport};
 use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
 use crate::options::LabOptions;
+use crate::part::SeedPart;
 
 /// Choices for a swarm.
 #[derive(Clone, Debug)]
@@ -114,23 +115,60 @@ impl fmt::Display for SeedReport {
     }
 }
 
+/// Sum of one seed, as a part of a swarm carries it.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeedSum {
+    /// The seed.
+    pub seed: u64,
+    /// The report in words, as shown.
+    pub words: String,
+    /// True if all held.
+    pub is_green: bool,
+    /// True if a fault had an effect.
+    pub had_effect: bool,
+    /// Frames seen.
+    pub frames: u64,
+    /// Working counters that were checked.
+    pub counters_checked: u64,
+}
+
+impl From<&SeedReport> for SeedSum {
+    fn from(report: &SeedReport) -> Self {
+        Self {
+            seed: report.seed,
+            words: report.to_string(),
+            is_green: report.is_green(),
+            had_effect: report.had_effect(),
+            frames: report.frames,
+            counters_checked: report.counters_checked,
+        }
+    }
+}
+
+/// Name and version of the format of a [`SwarmPart`].
+pub const PART_SCHEMA: &str = "linesman.swarm-part/1";
+
+/// Seeds of a range, and the habit that all were played with.
+pub type SwarmPart = SeedPart<Habit, SeedSum>;
+
 /// What came of a swarm.
 #[derive(Clone, Debug, Default)]
 pub struct SwarmReport {
-    /// Every seed's report, in order.
-    pub seeds: Vec<SeedReport>,
+    /// Every seed's sum, in order.
+    pub seeds: Vec<SeedSum>,
 }
 
 impl SwarmReport {
     /// Seeds in which something did not hold.
-    pub fn failed(&self) -> impl Iterator<Item = &SeedReport> {
-        self.seeds.iter().filter(|seed| !seed.is_green())
+    pub fn failed(&self) -> impl Iterator<Item = &SeedSum> {
+        self.seeds.iter().filter(|seed| !seed.is_green)
     }
 
     /// How many seeds had a fault with an effect.
     #[must_use]
     pub fn with_effect(&self) -> usize {
-        self.seeds.iter().filter(|seed| seed.had_effect()).count()
+        self.seeds.iter().filter(|seed| seed.had_effect).count()
     }
 
     /// Whether all held in all seeds, and most seeds had a fault with an effect.
@@ -138,21 +176,6 @@ impl SwarmReport {
     pub fn is_green(&self) -> bool {
         self.failed().next().is_none() && self.with_effect() * 2 > self.seeds.len()
     }
-}
-
-/// Runs many seeds, and shows each report as it comes.
-pub fn swarm(
-    seeds: Range<u64>,
-    options: &SwarmOptions,
-    mut progress: impl FnMut(&SeedReport),
-) -> SwarmReport {
-    let mut report = SwarmReport::default();
-    for seed in seeds {
-        let of_seed = run_seed(seed, options);
-        progress(&of_seed);
-        report.seeds.push(of_seed);
-    }
-    report
 }
 
 /// Runs one seed.

@@ -9,6 +9,7 @@ pub mod admit;
 pub mod claim;
 pub mod judge;
 pub mod proof;
+pub mod repair;
 pub mod sets;
 pub mod site;
 
@@ -16,8 +17,12 @@ pub use admit::{Admitted, Hop, Scene, Truth, TruthPlace};
 pub use claim::{Claim, Naming};
 pub use site::{Site, Way};
 
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+
 /// How well a claim fits.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
+#[serde(into = "String")]
 pub enum Grade {
     /// It is not so, and the evidence says it is not.
     Wrong,
@@ -35,8 +40,40 @@ impl Grade {
     }
 }
 
+/// `wrong`, `exact`, or the name of the set.
+impl From<Grade> for String {
+    fn from(grade: Grade) -> Self {
+        match grade {
+            Grade::Wrong => "wrong".to_owned(),
+            Grade::Exact => "exact".to_owned(),
+            Grade::Admitted(why) => {
+                let set = sets::ALL.iter().find(|set| set.why == why);
+                set.map_or(why, |set| set.name).to_owned()
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Grade {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(from)?;
+        match name.as_str() {
+            "wrong" => Ok(Self::Wrong),
+            "exact" => Ok(Self::Exact),
+            _ => {
+                let set = sets::ALL.iter().find(|set| set.name == name);
+                set.map(|set| Self::Admitted(set.why)).ok_or_else(|| {
+                    D::Error::custom(format!(
+                        "no set of causes is called `{name}`; expected wrong, exact or a set's name"
+                    ))
+                })
+            }
+        }
+    }
+}
+
 /// How well a claim fits a fault, place and cause apart.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
 pub struct Match {
     /// The place, whatever the cause.
     pub place: Grade,

@@ -50,6 +50,7 @@ fn recorded(path: &Path) -> (Recording, Learned) {
             number: frame.number.0,
             fcs: frame.fcs,
             truncated: frame.truncated,
+            probe: None,
             bytes: frame.bytes,
         });
     }

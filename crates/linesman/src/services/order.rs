@@ -21,9 +21,9 @@ type AnswerTo = Sender<Result<ServiceAnswer, RequestError>>;
 /// A service that somebody waits for.
 #[derive(Debug)]
 pub(crate) struct ServiceOrder {
-    pub(super) device: DeviceHandle,
-    pub(super) service: Service,
-    pub(super) answer: AnswerTo,
+    pub(crate) device: DeviceHandle,
+    pub(crate) service: Service,
+    pub(crate) answer: AnswerTo,
 }
 
 /// Orders of a run: those that are not taken, those that wait for their SubDevice, those that are being done.

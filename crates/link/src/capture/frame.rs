@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use linesman_proto::esl::EslRecord;
+
 use super::LinkType;
 pub use crate::direction::FrameDirection;
 use crate::unix_time::UnixTime;
@@ -50,6 +52,10 @@ pub struct CapturedFrame<'a> {
     /// Whether the check sequence is right: checked here where the file keeps it, or what the
     /// recorder's card reported. `None` when the file does not say.
     pub fcs: Option<bool>,
+    /// What a capture probe has added; [`time`](Self::time) is by its clock then.
+    pub probe: Option<EslRecord>,
+    /// All that was stored, without check sequence: [`bytes`](Self::bytes) and what a capture probe has added.
+    pub stored: &'a [u8],
     /// The Ethernet frame, without check sequence.
     pub bytes: &'a [u8],
 }
@@ -99,6 +105,8 @@ pub struct CaptureInterface {
     /// Frames that the recorder says it lost on this interface. They are missing in the file, not
     /// on the line. `None` when it does not say.
     pub drops: Option<u64>,
+    /// Time up to which it was recorded, whether or not frames came; `None` when the recorder does not say.
+    pub ended: Option<UnixTime>,
 }
 
 /// The step of a time stamp.

@@ -18,6 +18,7 @@ mod pcap_writer;
 mod pcapng;
 mod pcapng_options;
 mod pcapng_writer;
+mod probe_clock;
 mod reader;
 mod run_clock;
 mod window;

@@ -65,6 +65,7 @@ impl Pcap {
             snap_len: (header.snaplen != 0).then_some(header.snaplen),
             resolution,
             drops: None,
+            ended: None,
         };
         Ok((Self { big_endian: header.is_bigendian(), resolution, fcs_len }, interface))
     }

@@ -177,19 +177,26 @@ impl Pcapng {
             snap_len: (block.snaplen != 0).then_some(block.snaplen),
             resolution: options.resolution,
             drops: None,
+            ended: None,
         });
         Ok(())
     }
 
-    /// Interface statistics: drops of the card and of the operating system, up to this block.
+    /// Interface statistics: the time that they are of, and drops of the card and of the operating system until then.
     fn statistics(&self, block: &[u8], described: &mut [CaptureInterface]) -> Result<(), Damage> {
         let block = read(match self.order {
             ByteOrder::Little => parse_interfacestatisticsblock_le(block),
             ByteOrder::Big => parse_interfacestatisticsblock_be(block),
         })?;
+        let ticks = u64::from(block.ts_high) << 32 | u64::from(block.ts_low);
+        let known = self.interfaces.get(self.section_start..).unwrap_or_default();
+        let time = known.get(block.if_id as usize).filter(|_| ticks != 0).map(|interface| {
+            UnixTime::from_nanos(interface.resolution.nanos(ticks) + interface.offset_nanos)
+        });
         let described_here = described.get_mut(self.section_start..).unwrap_or_default();
         if let Some(interface) = described_here.get_mut(block.if_id as usize) {
             interface.drops = interface.drops.max(drops(self.order, &block.options));
+            interface.ended = time.or(interface.ended);
         }
         Ok(())
     }

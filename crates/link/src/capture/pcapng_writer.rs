@@ -128,6 +128,19 @@ impl<W: Write> PcapngWriter<W> {
     /// When its interface was not described, its length or time does not fit, or the sink fails.
     /// Nothing is written in the first three cases.
     pub fn write_frame(&mut self, frame: &FrameToWrite<'_>) -> Result<(), CaptureWriteError> {
+        self.write_commented(frame, "")
+    }
+
+    /// Writes a frame with a comment, cut at 1,024 bytes; empty for none.
+    ///
+    /// # Errors
+    /// As [`write_frame`](Self::write_frame).
+    pub fn write_commented(
+        &mut self,
+        frame: &FrameToWrite<'_>,
+        comment: &str,
+    ) -> Result<(), CaptureWriteError> {
+        const COMMENT: u16 = 1;
         self.check(frame.interface)?;
         let (captured, original_len) = frame.lengths()?;
         let time = u64::try_from(frame.time.as_nanos())
@@ -143,13 +156,16 @@ impl<W: Write> PcapngWriter<W> {
         let flags = flags(frame);
         if flags != 0 {
             self.option(2, &flags.to_le_bytes());
+        }
+        self.text(COMMENT, comment);
+        if flags != 0 || !comment.is_empty() {
             self.end_of_options();
         }
         self.finish_block()
     }
 
     /// Writes how many frames an interface has received and how many of them the recorder lost, up
-    /// to `time`. A reader then knows which frames are missing in the file only.
+    /// to `time`. A reader then knows which frames are missing in the file only, and that nothing came after the last one.
     ///
     /// # Errors
     /// As [`write_frame`](Self::write_frame).

@@ -8,6 +8,7 @@ use std::io::Read;
 use std::mem;
 use std::path::{Path, PathBuf};
 
+use linesman_proto::esl::{EslPlace, EslRecord, RECORD_LEN};
 use pcap_parser::pcapng::SHB_MAGIC;
 
 use super::cooked;
@@ -21,6 +22,7 @@ use super::frame::{
 use super::link_type::LinkType;
 use super::pcap::Pcap;
 use super::pcapng::{Item, Pcapng};
+use super::probe_clock::ProbeClock;
 use super::window::Window;
 use crate::input::{Input, Progress};
 use crate::unix_time::UnixTime;
@@ -38,6 +40,19 @@ pub struct CaptureReader {
     skipped: Vec<SkippedLinkType>,
     end: Option<CaptureEnd>,
     progress: Progress,
+    probe_clock: ProbeClock,
+    /// The frame that was read last.
+    current: Option<CurrentFrame>,
+}
+
+/// A frame that was read, but for its bytes.
+struct CurrentFrame {
+    time: Option<UnixTime>,
+    interface: CaptureInterfaceId,
+    link_type: LinkType,
+    original_len: u32,
+    truncated: bool,
+    shape: Shape,
 }
 
 enum Format {
@@ -113,17 +128,60 @@ impl CaptureReader {
             interfaces.push(interface);
             Format::Pcap(file)
         };
-        let (skipped, progress) = (Vec::new(), Progress::default());
-        Ok(Self { window, format, section, interfaces, frames: 0, skipped, end: None, progress })
+        Ok(Self {
+            window,
+            format,
+            section,
+            interfaces,
+            frames: 0,
+            skipped: Vec::new(),
+            end: None,
+            progress: Progress::default(),
+            probe_clock: ProbeClock::default(),
+            current: None,
+        })
     }
 
     /// The next frame that can carry EtherCAT; `None` at the end, which [`end`](Self::end) then
     /// describes.
     #[inline]
     pub fn next_frame(&mut self) -> Option<CapturedFrame<'_>> {
-        if self.end.is_some() {
-            return None;
-        }
+        if self.advance() { self.frame() } else { None }
+    }
+
+    /// Goes to the next frame that can carry EtherCAT; `false` at the end.
+    #[inline]
+    pub fn advance(&mut self) -> bool {
+        self.current = if self.end.is_some() { None } else { self.read() };
+        self.current.is_some()
+    }
+
+    /// The frame that [`advance`](Self::advance) went to.
+    #[must_use]
+    #[inline]
+    pub fn frame(&self) -> Option<CapturedFrame<'_>> {
+        let CurrentFrame { time, interface, link_type, original_len, truncated, shape } =
+            self.current.as_ref()?;
+        let stored = self.window.kept(shape.stored.at, shape.stored.len);
+        let start = shape.at - shape.stored.at;
+        Some(CapturedFrame {
+            number: FrameNumber(self.frames),
+            time: *time,
+            interface: *interface,
+            host_interface: shape.host_interface,
+            link_type: *link_type,
+            direction: shape.direction,
+            original_len: *original_len,
+            truncated: *truncated,
+            fcs: shape.fcs,
+            probe: shape.probe,
+            stored,
+            bytes: &stored[start..start + shape.len],
+        })
+    }
+
+    #[inline]
+    fn read(&mut self) -> Option<CurrentFrame> {
         loop {
             let start = self.window.offset();
             let item = match &mut self.format {
@@ -154,17 +212,17 @@ impl CaptureReader {
                 self.count_skipped(link_type);
                 continue;
             };
-            return Some(CapturedFrame {
-                number: FrameNumber(self.frames),
-                time: record.time,
+            let time = match shape.probe {
+                Some(probe) => self.probe_clock.place(record.time, probe.time_ns),
+                None => record.time,
+            };
+            return Some(CurrentFrame {
+                time,
                 interface: record.interface,
-                host_interface: shape.host_interface,
                 link_type,
-                direction: shape.direction,
                 original_len: record.original_len,
                 truncated: (record.len as u64) < u64::from(record.original_len),
-                fcs: shape.fcs,
-                bytes: self.window.passed(shape.at, shape.len),
+                shape,
             });
         }
     }
@@ -226,10 +284,20 @@ impl CaptureReader {
     }
 }
 
-/// The Ethernet frame in a record.
-struct Shape {
+/// A place in the buffer of the window.
+#[derive(Clone, Copy)]
+struct Stretch {
     at: usize,
     len: usize,
+}
+
+/// The Ethernet frame in a record.
+struct Shape {
+    /// All that was stored of it, without check sequence.
+    stored: Stretch,
+    at: usize,
+    len: usize,
+    probe: Option<EslRecord>,
     direction: FrameDirection,
     host_interface: Option<u32>,
     fcs: Option<bool>,
@@ -253,8 +321,10 @@ impl Shape {
     #[inline]
     fn ethernet(record: &Record, window: &mut Window) -> Self {
         let mut shape = Self {
+            stored: Stretch { at: record.at, len: record.len },
             at: record.at,
             len: record.len,
+            probe: None,
             direction: record.direction,
             host_interface: None,
             fcs: record.crc_error.then_some(false),
@@ -262,7 +332,25 @@ impl Shape {
         if record.fcs_len != 0 {
             shape.take_fcs_off(record, window);
         }
+        shape.stored.len = shape.len;
+        shape.take_probe_off(window);
         shape
+    }
+
+    /// Takes off the record of a capture probe, in front or behind.
+    #[inline]
+    fn take_probe_off(&mut self, window: &mut Window) {
+        let Some((probe, place, frame)) = EslRecord::find(window.passed(self.at, self.len)) else {
+            return;
+        };
+        self.len = frame.len();
+        if place == EslPlace::Front {
+            self.at += RECORD_LEN;
+        }
+        if probe.is_damaged() {
+            self.fcs = Some(false);
+        }
+        self.probe = Some(probe);
     }
 
     /// Takes off what there is of the check sequence: a truncated frame has only a part of it, or
@@ -282,9 +370,12 @@ impl Shape {
 
     fn cooked(record: &Record, cooked: Option<cooked::Cooked>) -> Option<Self> {
         let cooked = cooked?;
+        let (at, len) = (record.at + cooked.start, record.len - cooked.start);
         Some(Self {
-            at: record.at + cooked.start,
-            len: record.len - cooked.start,
+            stored: Stretch { at, len },
+            at,
+            len,
+            probe: None,
             direction: match record.direction {
                 FrameDirection::Unknown => cooked.direction,
                 FrameDirection::Incoming | FrameDirection::Outgoing => record.direction,

@@ -119,8 +119,9 @@ impl RunClock {
         Moment { at: self.at(time), backward }
     }
 
-    /// The time of the run that a time of the capture is.
-    fn at(&self, time: UnixTime) -> Instant {
+    /// The time of the run that a time of the capture is; [`Instant::ZERO`] also for what lies before the origin.
+    #[must_use]
+    pub fn at(&self, time: UnixTime) -> Instant {
         let since = self.origin.and_then(|origin| time.since(origin));
         Instant::ZERO + since.unwrap_or(Span::ZERO)
     }

@@ -101,6 +101,12 @@ impl Window {
         &mut self.buffer[at..at + len]
     }
 
+    /// The same bytes, to be looked at.
+    #[inline]
+    pub(super) fn kept(&self, at: usize, len: usize) -> &[u8] {
+        &self.buffer[at..at + len]
+    }
+
     /// Moves the window past `len` bytes without keeping them; gives how many there were.
     pub(super) fn skip(&mut self, len: u64) -> u64 {
         let mut left = len;

@@ -33,6 +33,8 @@ const CAPTURES: [&[u8]; 9] = [
     b"snoop\0\0\0",
     b"<?xml",
 ];
+/// First bytes of an archive: zip.
+const ARCHIVE: &[u8] = b"PK\x03\x04";
 /// Byte-order marks of texts: UTF-8, UTF-16 both ways round.
 const BYTE_ORDER_MARKS: [&[u8]; 3] = [b"\xEF\xBB\xBF", b"\xFF\xFE", b"\xFE\xFF"];
 /// Ends of names that say "this is a capture"; each may be followed by one of a packed file.
@@ -48,6 +50,8 @@ pub enum Content {
     Capture,
     /// A text: what somebody has written, or what another tool has printed.
     Text,
+    /// An archive (zip): a bundle, unless it holds something else.
+    Archive,
 }
 
 impl Content {
@@ -57,6 +61,9 @@ impl Content {
         let begins = |marks: &[&[u8]]| marks.iter().any(|mark| head.starts_with(mark));
         if begins(&CAPTURES) || head.is_empty() {
             return Self::Capture;
+        }
+        if head.starts_with(ARCHIVE) {
+            return Self::Archive;
         }
         let is_text = |byte: &u8| !byte.is_ascii_control() || b"\t\n\r\x0C\x1B".contains(byte);
         match begins(&BYTE_ORDER_MARKS) || is_utf_16(head) || head.iter().all(is_text) {
@@ -223,7 +230,9 @@ impl Input {
     pub fn content(&self) -> Content {
         let name = self.name.to_string_lossy();
         let begins_as_capture = CAPTURES.iter().any(|mark| self.head.starts_with(mark));
-        if is_capture_name(&name) {
+        if self.head.starts_with(ARCHIVE) {
+            Content::Archive
+        } else if is_capture_name(&name) {
             Content::Capture
         } else if is_text_name(&name) && !begins_as_capture {
             Content::Text
@@ -279,7 +288,7 @@ mod tests {
             (b"snoop\0\0\0\0\0", Content::Capture),
             (b"<?xml version=\"1.0\"?>", Content::Capture),
             (b"\x7FELF\x02\x01\x01\0", Content::Capture),
-            (b"PK\x03\x04", Content::Capture),
+            (b"PK\x03\x04", Content::Archive),
             (b"[[device]]\nname = \"K1\"\n", Content::Text),
             (b"0  0:0  PREOP  +  EK1100\r\n", Content::Text),
             ("\u{FEFF}Name;Größe\n".as_bytes(), Content::Text),

@@ -107,7 +107,7 @@ const fn reading(command: Command) -> Option<Command> {
 
 /// What was sent in a frame.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sent {
+struct SentTime {
     index: u8,
     departed: Instant,
     time: u64,
@@ -116,7 +116,7 @@ struct Sent {
 
 /// Whether the reference gives its time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-enum State {
+enum ReferenceState {
     /// It does, and that is handed round.
     #[default]
     Handed,
@@ -140,8 +140,8 @@ pub(super) enum Brought {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SystemTimeDistribution {
     known: ReferenceClock,
-    state: State,
-    sent: [Sent; KEPT],
+    state: ReferenceState,
+    sent: [SentTime; KEPT],
     next: usize,
     /// The reference's time in the latest frame that brought it, and when that frame left.
     last: Option<(Instant, u64)>,
@@ -158,7 +158,7 @@ impl SystemTimeDistribution {
             self.last = None;
         }
         if known.stands && (!before.stands || before.base != known.base) {
-            self.state = State::Handed;
+            self.state = ReferenceState::Handed;
         }
     }
 
@@ -170,9 +170,9 @@ impl SystemTimeDistribution {
         departed: Instant,
         frame: &mut [u8],
     ) {
-        let read_only = self.state != State::Handed;
+        let read_only = self.state != ReferenceState::Handed;
         let time = if read_only { 0 } else { datagram.cut(self.expected(departed).unwrap_or(0)) };
-        self.sent[self.next] = Sent { index, departed, time, read_only };
+        self.sent[self.next] = SentTime { index, departed, time, read_only };
         self.next = (self.next + 1) % KEPT;
         datagram.put(time, frame);
         if read_only {
@@ -198,22 +198,22 @@ impl SystemTimeDistribution {
             false => wkc.0 > 0 && (time != sent.time || self.usual == Some(wkc)),
         };
         if !is_answered {
-            self.state = State::Asked { answers: None };
+            self.state = ReferenceState::Asked { answers: None };
             return Brought::Nothing;
         }
         if !sent.read_only && time != sent.time {
             self.usual = Some(wkc);
         }
         let since = match self.state {
-            State::Asked { answers } => Some(answers.unwrap_or(sent.departed)),
-            State::Handed => (!self.known.stands).then_some(sent.departed),
+            ReferenceState::Asked { answers } => Some(answers.unwrap_or(sent.departed)),
+            ReferenceState::Handed => (!self.known.stands).then_some(sent.departed),
         };
         if let Some(since) = since {
             if !self.is_right(datagram, &sent, time, since) {
-                self.state = State::Asked { answers: Some(since) };
+                self.state = ReferenceState::Asked { answers: Some(since) };
                 return Brought::Nothing;
             }
-            self.state = State::Handed;
+            self.state = ReferenceState::Handed;
         }
         self.last = Some((sent.departed, time));
         Brought::Time
@@ -227,7 +227,13 @@ impl SystemTimeDistribution {
     }
 
     /// Whether whoever answers since `since` shows the time that all have.
-    fn is_right(&self, datagram: &ClockDatagram, sent: &Sent, time: u64, since: Instant) -> bool {
+    fn is_right(
+        &self,
+        datagram: &ClockDatagram,
+        sent: &SentTime,
+        time: u64,
+        since: Instant,
+    ) -> bool {
         let Some(expected) = self.expected(sent.departed) else { return true };
         let away = self.last.map_or(0, |(at, _)| sent.departed.since(at).as_nanos());
         // The low half alone goes round; a clock of 32 bits answers the other one with zeros.

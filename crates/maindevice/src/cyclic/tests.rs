@@ -277,7 +277,16 @@ fn data_tell_how_old_they_are() {
     assert_eq!(quality(&fixture, 1), (false, Some(4)));
 }
 
-// proves: PLC-02 partial: at the interface of Rust
+// proves: PLC-02
+#[test]
+fn each_of_fifteen_datagrams_has_a_bit_and_the_whole_frame_the_last() {
+    let bits: Vec<u16> = (0..15).map(FrameStatus::bit).collect();
+    assert_eq!((bits[0], bits[14]), (0x0001, 0x4000));
+    assert_eq!(bits.iter().fold(0, |all, bit| all ^ bit), 0x7FFF);
+    assert_eq!((FrameStatus::WHOLE, FrameStatus::bit(15)), (0x8000, 0));
+}
+
+// proves: PLC-02 partial: of one datagram
 #[test]
 fn each_frame_tells_how_it_went() {
     let mut fixture = Fixture::new();

@@ -13,6 +13,7 @@ impl Event {
     ///
     /// A refused step is a pair of lines: where the SubDevice was to go and where it is, then what was
     /// read and what was expected.
+    // Long for its number of events: one arm each, and all names of those that have no words here.
     #[must_use]
     pub fn state_lines(&self, name: impl Fn(DeviceId) -> String) -> Vec<String> {
         match self {

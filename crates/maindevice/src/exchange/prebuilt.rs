@@ -38,7 +38,7 @@ const FIRST_DATA: usize = FIRST_HEADER + DATAGRAM_HEADER_LEN;
 
 /// One datagram of a prebuilt frame.
 #[derive(Clone, Copy, Debug)]
-struct Shape {
+struct DatagramShape {
     /// Offset of its header.
     at: usize,
     /// The first eight bytes of its header with index 0: as planned, and with its outputs withheld.
@@ -47,7 +47,7 @@ struct Shape {
     masks: [u64; 2],
 }
 
-impl Shape {
+impl DatagramShape {
     /// No datagram.
     const NONE: Self = Self { at: FIRST_HEADER, heads: [0; 2], masks: [u64::MAX; 2] };
 
@@ -71,7 +71,7 @@ const BEHIND_ADDRESSES: usize = 12;
 
 /// A piece of a frame that is the same each time.
 #[derive(Clone, Debug)]
-enum Piece {
+enum FramePiece {
     /// Zeros: what is read, and working counters.
     Zeros(Range<usize>),
     /// Anything else.
@@ -85,7 +85,7 @@ pub(crate) struct Prebuilt {
     /// Without outputs; in the exchange, where copies follow, the one that was sent last.
     bytes: Vec<u8>,
     /// What of these bytes, behind the first head, is copied into a frame that is sent; empty: all.
-    pieces: Vec<Piece>,
+    pieces: Vec<FramePiece>,
     /// All that is before the data of the first datagram.
     beginning: [u8; FIRST_DATA],
     /// What comes back as it was sent if nobody had a hand in it, but for what
@@ -96,8 +96,8 @@ pub(crate) struct Prebuilt {
     /// Which of the plan's it is, where its only answer is waited for; else [`Slot::NONE`].
     awaited: u32,
     /// The first datagram, at hand, and all of them.
-    first: Shape,
-    shapes: Vec<Shape>,
+    first: DatagramShape,
+    shapes: Vec<DatagramShape>,
     /// Bytes that a whole reply has at least.
     len: usize,
 }
@@ -154,9 +154,9 @@ impl Prebuilt {
             // What hands the reference's time round is a mere read at times.
             let free = if role == Role::ReferenceClock { COMMAND } else { 0 };
             let masks = commands.map(|command| mask(command) & !free);
-            Shape { at: header, heads: commands.map(variant), masks }
+            DatagramShape { at: header, heads: commands.map(variant), masks }
         };
-        let shapes: Vec<Shape> = places.into_iter().map(shape).collect();
+        let shapes: Vec<DatagramShape> = places.into_iter().map(shape).collect();
         let outputs = || {
             let datagrams = plan.datagrams.iter().zip(data_offsets(plan));
             datagrams.flat_map(|(one, data)| {
@@ -186,7 +186,7 @@ impl Prebuilt {
         let mut copies = Copies::new(plan.repeats.saturating_add(1), ring);
         copies.unsent -= 1;
         let awaited = if ring { Slot::NONE } else { index };
-        let first = shapes.first().copied().unwrap_or(Shape::NONE);
+        let first = shapes.first().copied().unwrap_or(DatagramShape::NONE);
         Self { bytes, pieces, beginning, fixed, copies, awaited, first, shapes, len: at }
     }
 
@@ -222,12 +222,12 @@ impl Prebuilt {
         }
         for piece in &self.pieces {
             match piece {
-                Piece::Zeros(range) => {
+                FramePiece::Zeros(range) => {
                     if let Some(to) = sent.get_mut(range.clone()) {
                         to.fill(0);
                     }
                 }
-                Piece::Bytes(range) => {
+                FramePiece::Bytes(range) => {
                     if let (Some(to), Some(from)) =
                         (sent.get_mut(range.clone()), self.bytes.get(range.clone()))
                     {
@@ -361,13 +361,13 @@ fn gaps(all: Range<usize>, taken: Vec<Range<usize>>) -> Vec<Range<usize>> {
 
 /// A gap between long outputs as pieces: its zeros, as far as they are many, and the bytes before them.
 /// What is read lies behind the outputs, and a working counter behind that.
-fn pieces(bytes: &[u8], gap: Range<usize>) -> impl Iterator<Item = Piece> {
+fn pieces(bytes: &[u8], gap: Range<usize>) -> impl Iterator<Item = FramePiece> {
     let same = bytes.get(gap.clone()).unwrap_or_default();
     let zeros = same.iter().rev().take_while(|byte| **byte == 0).count();
     let split = if zeros >= LONG { gap.end - zeros } else { gap.end };
     let (before, behind) = (gap.start..split, split..gap.end);
-    let before = (!before.is_empty()).then_some(Piece::Bytes(before));
-    before.into_iter().chain((!behind.is_empty()).then_some(Piece::Zeros(behind)))
+    let before = (!before.is_empty()).then_some(FramePiece::Bytes(before));
+    before.into_iter().chain((!behind.is_empty()).then_some(FramePiece::Zeros(behind)))
 }
 
 /// Where the data of each datagram of a plan's frame begin, in order.

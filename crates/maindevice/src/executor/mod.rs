@@ -143,7 +143,7 @@ impl Wake for TaskWaker {
     }
 }
 
-struct Task {
+struct ProcedureTask {
     group: Group,
     future: task::BoxFuture,
     waker: Waker,
@@ -153,7 +153,7 @@ struct Task {
 /// The poller.
 pub(crate) struct Executor {
     shared: Arc<Shared>,
-    tasks: BTreeMap<u64, Task>,
+    tasks: BTreeMap<u64, ProcedureTask>,
     next_task: u64,
     next_group: u32,
 }
@@ -323,7 +323,7 @@ impl Executor {
             let shared = Arc::clone(&self.shared);
             let waker =
                 Waker::from(Arc::new(TaskWaker { id, shared, queued: Arc::clone(&queued) }));
-            self.tasks.insert(id, Task { group, future, waker, queued });
+            self.tasks.insert(id, ProcedureTask { group, future, waker, queued });
             self.shared.push_ready(id);
         }
     }

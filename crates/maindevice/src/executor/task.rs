@@ -15,21 +15,21 @@ pub(crate) struct Spawned {
     pub(crate) future: BoxFuture,
 }
 
-struct Outcome<T> {
+struct TaskOutcome<T> {
     value: Option<T>,
     waker: Option<Waker>,
 }
 
 /// Awaits what a task gives. Dropping it leaves the task running.
 pub struct Handle<T> {
-    outcome: Arc<Mutex<Outcome<T>>>,
+    outcome: Arc<Mutex<TaskOutcome<T>>>,
 }
 
 /// A task that leaves its value for a handle.
 pub(crate) fn with_handle<T: Send + 'static>(
     future: impl Future<Output = T> + Send + 'static,
 ) -> (BoxFuture, Handle<T>) {
-    let outcome = Arc::new(Mutex::new(Outcome { value: None, waker: None }));
+    let outcome = Arc::new(Mutex::new(TaskOutcome { value: None, waker: None }));
     let handle = Handle { outcome: Arc::clone(&outcome) };
     let task = async move {
         let value = future.await;

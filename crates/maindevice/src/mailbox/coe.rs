@@ -19,7 +19,7 @@ pub(crate) async fn upload(
     object: ObjectAddress,
     complete: bool,
 ) -> Result<Vec<u8>, Why> {
-    let mut transfer = Transfer { transaction, object, complete };
+    let mut transfer = SdoTransfer { transaction, object, complete };
     let result = transfer.upload().await;
     transfer.end(result).await
 }
@@ -31,12 +31,12 @@ pub(crate) async fn download(
     complete: bool,
     data: &[u8],
 ) -> Result<(), Why> {
-    let mut transfer = Transfer { transaction, object, complete };
+    let mut transfer = SdoTransfer { transaction, object, complete };
     let result = transfer.download(data).await;
     transfer.end(result).await
 }
 
-struct Transfer<'a, 'b> {
+struct SdoTransfer<'a, 'b> {
     transaction: &'a mut MailboxTransaction<'b>,
     object: ObjectAddress,
     complete: bool,
@@ -70,7 +70,7 @@ fn wrong(expected: &'static str, found: impl Into<String>) -> Why {
     Why::Protocol { expected, found: found.into() }
 }
 
-impl Transfer<'_, '_> {
+impl SdoTransfer<'_, '_> {
     async fn upload(&mut self) -> Result<Vec<u8>, Why> {
         let (object, complete) = (self.object, self.complete);
         let expected = "the answer to an upload";

@@ -12,7 +12,7 @@ use super::MailboxQueues;
 
 /// Where the bit of one mailbox is.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct StatusBit {
     id: DeviceId,
     /// The cyclic frame, counted through all tasks, and the datagram in it.
     frame: usize,
@@ -25,7 +25,7 @@ struct Place {
 /// The bits of all mailboxes of a plan.
 #[derive(Debug, Default)]
 pub(crate) struct MailboxBits {
-    places: Vec<Place>,
+    places: Vec<StatusBit>,
     queues: MailboxQueues,
     /// Some bit was set the last time.
     any: bool,
@@ -46,7 +46,7 @@ impl MailboxBits {
                     let (_, fmmu) = device.mailbox_state.as_ref()?;
                     let byte = fmmu.logical_start.0.checked_sub(start.0)? as usize;
                     let mask = 1_u8.checked_shl(fmmu.logical_start_bit.into())?;
-                    let place = Place { id: device.id, frame, datagram, byte, mask };
+                    let place = StatusBit { id: device.id, frame, datagram, byte, mask };
                     (byte < one.len && device.mailbox.is_some()).then_some(place)
                 };
                 places.extend(plan.devices.iter().filter_map(place));
@@ -70,7 +70,8 @@ impl MailboxBits {
     #[inline(never)]
     fn tell(&self, frame: usize, datagram: usize, bits: &[u8]) {
         let mine = self.places.iter().filter(|one| (one.frame, one.datagram) == (frame, datagram));
-        let full = |place: &Place| bits.get(place.byte).is_some_and(|byte| byte & place.mask != 0);
+        let full =
+            |place: &StatusBit| bits.get(place.byte).is_some_and(|byte| byte & place.mask != 0);
         self.queues.see(mine.map(|place| (place.id, full(place))));
     }
 }

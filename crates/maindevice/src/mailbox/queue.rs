@@ -27,11 +27,11 @@ pub(crate) type Outcome = Result<Vec<u8>, MailboxFailure>;
 pub(crate) struct MailboxJob {
     pub(crate) id: DeviceId,
     pub(crate) request: MailboxRequest,
-    slot: Arc<Mutex<Slot>>,
+    slot: Arc<Mutex<QueueSlot>>,
 }
 
 #[derive(Default, Debug)]
-struct Slot {
+struct QueueSlot {
     outcome: Option<Outcome>,
     waker: Option<Waker>,
 }
@@ -68,7 +68,7 @@ fn failure(id: DeviceId, request: &MailboxRequest, why: Why) -> MailboxFailure {
 
 /// The outcome of an operation, to be awaited.
 pub(crate) struct Pending {
-    slot: Arc<Mutex<Slot>>,
+    slot: Arc<Mutex<QueueSlot>>,
 }
 
 impl Future for Pending {
@@ -111,7 +111,7 @@ impl MailboxQueues {
 
     /// Asks a SubDevice through its mailbox, behind those who asked before; await what comes of it.
     pub(crate) fn ask(&self, id: DeviceId, request: MailboxRequest) -> Pending {
-        let slot = Arc::new(Mutex::new(Slot::default()));
+        let slot = Arc::new(Mutex::new(QueueSlot::default()));
         let job = MailboxJob { id, request, slot: Arc::clone(&slot) };
         let mut queues = lock(&self.queues);
         let Some(queue) = queues.get_mut(&id) else {

@@ -8,7 +8,7 @@ use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Instant;
 
-use super::{MainDevice, Running};
+use super::{MainDevice, RunningPlan};
 use crate::cyclic::Cyclic;
 use crate::event::Event;
 use crate::exchange::Target;
@@ -95,7 +95,7 @@ impl MainDevice {
         let mut cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         cyclic.serve(mailboxes.clone());
         let network_status = NetworkStatus::new(&plan);
-        self.running = Some(Running { cyclic, plan, device_table, mailboxes, network_status });
+        self.running = Some(RunningPlan { cyclic, plan, device_table, mailboxes, network_status });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
     }
@@ -241,7 +241,7 @@ impl MainDevice {
 
     /// Serves the SubDevices of a plan without driving them: each stays in its state until a
     /// [`Service`] takes it elsewhere. Another command that is going on is ended.
-    pub fn attend(&mut self, now: Instant, plan: Plan) {
+    pub fn serve_only(&mut self, now: Instant, plan: Plan) {
         let wire = self.command();
         self.service_only = Some(ServiceOnly::new(&wire, self.network, plan, &self.options));
         self.handle_timeout(now);
@@ -266,7 +266,7 @@ impl MainDevice {
 
     fn context(&self) -> Option<ServiceContext> {
         let (wire, options) = (self.aside.clone(), Arc::clone(&self.options));
-        if let Some(Running { plan, device_table, mailboxes, .. }) = &self.running {
+        if let Some(RunningPlan { plan, device_table, mailboxes, .. }) = &self.running {
             let (plan, device_table, mailboxes) =
                 (Arc::clone(plan), Arc::clone(device_table), mailboxes.clone());
             return Some(ServiceContext {

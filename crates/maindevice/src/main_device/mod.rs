@@ -46,7 +46,7 @@ pub struct MainDevice {
     control: Option<Wire>,
     /// Probes, which outlive commands.
     aside: Wire,
-    running: Option<Running>,
+    running: Option<RunningPlan>,
     /// SubDevices that are served without being driven.
     service_only: Option<ServiceOnly>,
     /// Who the last scan has found: a plan that starts right behind it need not ask again.
@@ -59,7 +59,7 @@ pub struct MainDevice {
 }
 
 #[derive(Debug)]
-struct Running {
+struct RunningPlan {
     cyclic: Cyclic,
     plan: Arc<Plan>,
     device_table: Arc<Mutex<DeviceTable>>,
@@ -162,7 +162,7 @@ impl MainDevice {
         }
         let mut room = MAX_LEN;
         // Beside process data so many a cycle; before, as fast as they come back.
-        let settled = |running: &&Running| lock(&running.device_table).all_have_been_reached();
+        let settled = |running: &&RunningPlan| lock(&running.device_table).all_have_been_reached();
         if let Some(running) = self.running.as_ref().filter(settled) {
             let Some(left) = self.acyclic_left.checked_sub(1) else { return };
             let until = running.cyclic.due().since(now).as_nanos() / BYTE_NS;
@@ -215,7 +215,7 @@ impl MainDevice {
     /// Takes a frame if it is a cyclic one as it comes back nearly always.
     #[inline]
     fn receive_cyclic(&mut self, now: Instant, frame: &[u8]) -> bool {
-        let Some(Running { cyclic, .. }) = &mut self.running else { return false };
+        let Some(RunningPlan { cyclic, .. }) = &mut self.running else { return false };
         let (executor, statistics) = (&self.executor, &mut self.statistics);
         let emit = &mut |event| executor.emit(event);
         cyclic.receive(now, frame, &mut self.exchange, statistics, emit)

@@ -1,6 +1,6 @@
 //! Single services for SubDevices: what tools ask for one at a time.
 //!
-//! [`MainDevice::service_only`](crate::MainDevice::service_only) serves the SubDevices of a plan without driving
+//! [`MainDevice::serve_only`](crate::MainDevice::serve_only) serves the SubDevices of a plan without driving
 //! them; [`MainDevice::serve`](crate::MainDevice::serve) does one [`Service`], there or beside a
 //! running plan, and ends in [`Event::Served`](crate::Event::Served).
 

@@ -112,7 +112,18 @@ async fn locate(
             identity,
         })
         .collect();
-    // Stretches between landmarks.
+    match_stretches(context, &seen).await;
+    for device in &context.plan.devices {
+        if lock(&context.device_table).found(device.id) == Reachability::Unknown {
+            lose(context, device.id);
+        }
+    }
+    context.note(Phase::Identify, began);
+    Ok(())
+}
+
+/// Matches controllers and planned SubDevices in each stretch between landmarks: those whose address is known.
+async fn match_stretches(context: &Context, seen: &[FoundController]) {
     let (mut first_seen, mut first_planned) = (0, 0);
     for end in 0..=seen.len() {
         let landmark = seen.get(end).map(|seen| seen.known);
@@ -127,13 +138,6 @@ async fn locate(
         }
         first_seen = end + 1;
     }
-    for device in &context.plan.devices {
-        if lock(&context.device_table).found(device.id) == Reachability::Unknown {
-            lose(context, device.id);
-        }
-    }
-    context.note(Phase::Identify, began);
-    Ok(())
 }
 
 /// How often each address is there.

@@ -194,6 +194,7 @@ impl WatchedDevice {
         self.history.iter()
     }
 
+    // Long for its number of events: one short arm each.
     #[allow(clippy::wildcard_enum_match_arm, reason = "the others say nothing of a SubDevice")]
     pub(super) fn handle_event(&mut self, now: Instant, event: &Event) {
         match event {

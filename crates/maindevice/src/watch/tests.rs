@@ -160,7 +160,7 @@ fn aborted_and_abnormal_state_changes_read_as_in_the_sources() {
     assert_eq!(device.history().next().unwrap().code, AlStatusCode(0x001B));
 }
 
-// proves: HW-12 partial: the numbers, PLC-16 partial: the numbers
+// proves: HW-12, PLC-16 partial: the numbers
 #[test]
 fn the_change_counters_begin_at_nought_and_one() {
     let mut watch = watch();
@@ -178,6 +178,16 @@ fn the_change_counters_begin_at_nought_and_one() {
         watch.handle_event(at(time + 1), &back);
     }
     assert_eq!(changes(&watch), (0, 3));
+    // It left OP by itself.
+    watch.handle_event(at(6), &state(3, AlState::Op, false, 0));
+    let fell = Event::AbnormalState {
+        id: DeviceId(3),
+        from: AlState::Op,
+        status: AlStatus::new(AlState::SafeOp).with_error(true),
+        code: AlStatusCode(0x001B),
+    };
+    watch.handle_event(at(7), &fell);
+    assert_eq!(changes(&watch), (1, 3));
     watch.clear();
     assert_eq!(changes(&watch), (0, 1));
 }

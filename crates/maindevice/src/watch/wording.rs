@@ -14,6 +14,7 @@ use super::{EntryKind, LogEntry, NetworkStatus, Severity};
 use crate::event::Event;
 
 /// The entries for an event; `network_status` is that before it.
+// Long for its number of events: one short arm each; longer wordings are methods of `EntryWords`.
 #[allow(clippy::wildcard_enum_match_arm, reason = "answers are told by whoever asked")]
 pub(super) fn of(
     at: Instant,

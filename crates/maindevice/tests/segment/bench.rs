@@ -41,6 +41,8 @@ pub(crate) struct Bench {
     /// How many cycles were judged, and in how many the data were not valid.
     pub(crate) cycles: u64,
     pub(crate) bad_cycles: u64,
+    /// What crosses the cards, if anybody wants to know: by which card, whether it comes back, and the frame.
+    pub(crate) crossed: Option<Vec<(Path, bool, Vec<u8>)>>,
     arrivals: u64,
     delayed: Vec<(Instant, Path, Vec<u8>)>,
 }
@@ -65,6 +67,7 @@ impl Bench {
             judged: None,
             cycles: 0,
             bad_cycles: 0,
+            crossed: None,
             arrivals: 0,
             delayed: Vec::new(),
         }
@@ -77,7 +80,9 @@ impl Bench {
         let mut arrival_buffer = Vec::new();
         loop {
             while let Some(transmit) = self.device.poll_transmit(self.now, &mut buffer) {
-                self.segment.handle_frame(transmit.at, transmit.path, &buffer[..transmit.len]);
+                let frame = &buffer[..transmit.len];
+                self.segment.handle_frame(transmit.at, transmit.path, frame);
+                self.note(transmit.path, false, frame);
             }
             let mut finished = false;
             while let Some(event) = self.device.poll_event() {
@@ -125,7 +130,14 @@ impl Bench {
         }
     }
 
+    fn note(&mut self, path: Path, comes_back: bool, frame: &[u8]) {
+        if let Some(crossed) = &mut self.crossed {
+            crossed.push((path, comes_back, frame.to_vec()));
+        }
+    }
+
     fn arrive(&mut self, path: Path, frame: &[u8]) {
+        self.note(path, true, frame);
         self.arrivals += 1;
         let fate = self.tamper.as_mut().map_or(Fate::Arrives, |tamper| tamper(self.arrivals));
         match fate {

@@ -90,7 +90,7 @@ fn is_terminal(kind: &str) -> bool {
     kind.starts_with("EL")
 }
 
-// proves: DC-01 partial: our MainDevice's set-up, quartzes of ±50 ppm that warm up, DC-03 partial, DC-04 partial, DC-07 partial
+// proves: DC-01, DC-03 partial, DC-04 partial, DC-07
 #[test]
 fn clocks_are_aligned_to_100_ns_and_stay_so() {
     let epoch = DcTime(850_000_000_123_456_789);

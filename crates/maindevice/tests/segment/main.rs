@@ -21,6 +21,7 @@ mod scan;
 mod soak;
 mod software;
 mod start_up;
+mod synchronisation;
 mod tasks;
 mod watch;
 mod wire_faults;

@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use linesman_maindevice::{Event, Options};
 use linesman_proto::address::Path;
+use linesman_proto::frame::FrameView;
 use linesman_proto::port::Port;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
@@ -35,7 +36,6 @@ fn bench() -> Bench {
     Bench::with_options(RING, Options { ring: true, ..Options::default() })
 }
 
-// proves: RED-02, RED-03
 #[test]
 fn an_intact_ring_is_scanned_and_run() {
     let mut bench = bench();
@@ -50,7 +50,82 @@ fn an_intact_ring_is_scanned_and_run() {
     assert_eq!(after.working_counter_errors, before.working_counter_errors);
 }
 
-// proves: RED-05, RED-06, RED-01 partial: in the virtual segment only
+/// The working counters of a frame.
+fn counters(frame: &[u8]) -> Vec<u16> {
+    let view = FrameView::parse(frame).unwrap();
+    view.datagrams().map(|datagram| datagram.unwrap().wkc().value()).collect()
+}
+
+// proves: RED-02, RED-03
+#[test]
+fn each_frame_leaves_by_both_cards_and_only_the_copy_of_card_a_is_counted() {
+    let mut bench = bench();
+    bench.scan();
+    bench.start(AlState::Op);
+    bench.crossed = Some(Vec::new());
+    bench.run_for(Span::ms(50));
+    let crossed = bench.crossed.take().unwrap();
+    let of = |card: Path, came_back: bool| -> Vec<&[u8]> {
+        let wanted = crossed.iter().filter(|(path, back, _)| (*path, *back) == (card, came_back));
+        wanted.map(|(.., frame)| frame.as_slice()).collect()
+    };
+    let (sent_a, sent_b) = (of(Path::A, false), of(Path::B, false));
+    assert!(sent_a.len() > 20 && sent_a.len() == sent_b.len(), "{}", sent_a.len());
+    for (one, other) in sent_a.iter().zip(&sent_b) {
+        assert_ne!(one[6..12], other[6..12], "told apart by their source address");
+        assert_eq!(one[12..], other[12..], "and by nothing else");
+    }
+    // Each card takes the copy of the other; a controller marks what its processing unit has passed.
+    let source = |frame: &[u8]| -> [u8; 6] { frame[6..12].try_into().unwrap() };
+    let marked = |address: [u8; 6]| {
+        [address[0] | 0x02, address[1], address[2], address[3], address[4], address[5]]
+    };
+    let (back_a, back_b) = (of(Path::A, true), of(Path::B, true));
+    assert_eq!((back_a.len(), back_b.len()), (sent_a.len(), sent_b.len()));
+    for frame in back_b {
+        assert_eq!(source(frame), marked(source(sent_a[0])));
+        assert!(counters(frame).iter().any(|counter| *counter > 0), "{:?}", counters(frame));
+    }
+    for frame in back_a {
+        assert_eq!(source(frame), source(sent_b[0]), "passed no processing unit");
+        assert!(counters(frame).iter().all(|counter| *counter == 0), "{:?}", counters(frame));
+    }
+}
+
+// proves: RED-04
+#[test]
+fn a_break_costs_at_most_one_frame_and_both_neighbours_close_their_port() {
+    for (cut, ends) in [
+        ("B1.B-B2.A", [("B1", Port::B), ("B2", Port::A)]),
+        ("B2.B-B3.A", [("B2", Port::B), ("B3", Port::A)]),
+        ("B3.B-B4.A", [("B3", Port::B), ("B4", Port::A)]),
+    ] {
+        // At another moment of the cycle each time, amid frames that cross the break too.
+        for offset in 0..25 {
+            let mut bench = bench();
+            bench.start(AlState::Op);
+            bench.run_for(Span::us(20_000 + 40 * offset));
+            let before = bench.device.statistics();
+            let entry = FaultEntry::new("link-open".parse().unwrap()).at(cut);
+            bench.segment.inject(bench.now, &entry).unwrap();
+            bench.run_for(Span::ms(200));
+            let after = bench.device.statistics();
+            let lost = after.frames_lost - before.frames_lost;
+            let short = after.working_counter_errors - before.working_counter_errors;
+            assert!(lost + short <= 1, "{cut}, {offset}: {lost} lost, {short} incomplete");
+            for (name, port) in ends {
+                let id = bench.id(name);
+                let status = bench.segment.controller(id).unwrap().dl_status();
+                assert!(status.port_state(port).closed, "{cut}: {name}.{port}");
+            }
+            for name in ["B1", "B2", "B3", "B4"] {
+                assert_eq!(bench.state(name), "OP", "{cut}, {offset}: {name}");
+            }
+        }
+    }
+}
+
+// proves: RED-01, RED-05, RED-06
 #[test]
 fn a_cut_ring_keeps_all_subdevices() {
     let mut bench = bench();
@@ -82,6 +157,42 @@ fn a_cut_ring_keeps_all_subdevices() {
     bench.run_for(Span::ms(200));
     assert_eq!(bench.device.statistics().working_counter_errors, before);
     assert_eq!(bench.state("B4"), "OP");
+}
+
+// proves: RED-10
+#[test]
+fn what_lies_between_two_breaks_is_out_of_reach_until_they_are_mended() {
+    let mut bench = bench();
+    bench.start(AlState::Op);
+    bench.events.clear();
+    let cut = |bench: &mut Bench, place: &str| {
+        let entry = FaultEntry::new("link-open".parse().unwrap()).at(place);
+        bench.segment.inject(bench.now, &entry).unwrap()
+    };
+    let first = cut(&mut bench, "B1.B-B2.A");
+    bench.run_for(Span::ms(500));
+    let lost = |bench: &Bench| -> Vec<u32> {
+        let lost = bench.events.iter().filter_map(|(_, event)| {
+            if let Event::DeviceLost { id } = event { Some(id.no()) } else { None }
+        });
+        lost.collect()
+    };
+    assert_eq!(lost(&bench), Vec::<u32>::new(), "one break costs nobody");
+    let second = cut(&mut bench, "B3.B-B4.A");
+    bench.run_for(Span::s(1));
+    let mut between = lost(&bench);
+    between.sort_unstable();
+    assert_eq!(between, [2, 3], "those between the breaks, and no others");
+    assert_eq!((bench.state("B1"), bench.state("B4")), ("OP".to_owned(), "OP".to_owned()));
+    bench.segment.heal(bench.now, second);
+    bench.segment.heal(bench.now, first);
+    bench.events.clear();
+    bench.run_for(Span::s(10));
+    for name in ["B1", "B2", "B3", "B4"] {
+        assert_eq!(bench.state(name), "OP", "{name}");
+    }
+    let whole = |(_, event): &(_, Event)| matches!(event, Event::Ring { intact: true });
+    assert!(bench.events.iter().any(whole), "the ring is whole again: {:#?}", bench.events);
 }
 
 /// The line is switched on with a break: it is scanned and started all the same.

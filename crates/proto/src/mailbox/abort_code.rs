@@ -275,7 +275,7 @@ mod tests {
         }
     }
 
-    // proves: SW-10 partial
+    // proves: SW-10
     #[test]
     fn the_refusals_of_the_sources() {
         let table = [

@@ -86,6 +86,13 @@ impl Total {
     /// frame: the next reading counts from 0, and nothing is lost.
     pub fn note_own_clear(&mut self) {
         self.last = Some(0);
+        // One that stood at its end counts again, and from 0: all that it has counted since is exact.
+        self.lost &= self.rise > 0;
+    }
+
+    /// Begins a new count: losses so far belong to the counts so far, and later rises are exact again.
+    pub const fn begin_anew(&mut self) {
+        self.lost = false;
     }
 
     /// All rises together.
@@ -100,7 +107,7 @@ impl Total {
         self.clears
     }
 
-    /// Whether [`rise`](Self::rise) is only a lower bound.
+    /// True if [`rise`](Self::rise), since it [began anew](Self::begin_anew), is only a lower bound.
     #[must_use]
     pub const fn is_lower_bound(&self) -> bool {
         self.lost

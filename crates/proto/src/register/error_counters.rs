@@ -371,6 +371,20 @@ mod tests {
         assert_eq!(RxErrors { frames: 18, physical: 4 }.to_word(), 0x0412);
     }
 
+    // proves: HW-08
+    #[test]
+    fn each_port_has_a_byte_of_lost_links_and_two_share_a_word() {
+        let start = table::LOST_LINK_COUNTER.address;
+        let counters = ErrorCounters::from_bytes(&[1, 2, 3, 4], start);
+        let lost = |counters: &ErrorCounters| Port::ALL.map(|port| counters.lost_link[port]);
+        assert_eq!((start.0, lost(&counters)), (0x0310, [1, 2, 3, 4].map(Some)));
+        let word = |address, value: u16| {
+            lost(&ErrorCounters::from_bytes(&value.to_le_bytes(), RegisterAddress(address)))
+        };
+        assert_eq!(word(0x0310, 0x0201), [Some(1), Some(2), None, None]);
+        assert_eq!(word(0x0312, 0x0403), [None, None, Some(3), Some(4)]);
+    }
+
     #[test]
     fn the_whole_block_goes_both_ways() {
         let counters = ErrorCounters::from_bytes(&BLOCK, ErrorCounters::START);

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use Port::{A, B, C, D};
 
-    // proves: ESC-09 partial, JCT-09 partial, JCT-10 partial
+    // proves: ESC-02, ESC-09 partial, JCT-09 partial, JCT-10 partial
     #[test]
     fn the_entry_decides_what_lies_before_the_processing_unit() {
         // Each row: entry, open ports, met before the unit, met after it.

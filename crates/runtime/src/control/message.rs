@@ -12,7 +12,8 @@ pub const FAULTS_SCHEMA: &str = "linesman.faults/1";
 pub const SIGNALS_SCHEMA: &str = "linesman.signals/1";
 
 /// What can be asked.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "do", rename_all = "kebab-case")]
 pub enum Request {
     /// Put a fault on the line now. The answer is about faults.
@@ -82,7 +83,8 @@ pub enum Answer {
 }
 
 /// All faults so far.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Faults {
     /// `linesman.faults/1`.
@@ -94,7 +96,8 @@ pub struct Faults {
 }
 
 /// A fault and what came of it.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FaultState {
     /// Its number, from 1, in the order of injection.
@@ -114,7 +117,8 @@ pub struct FaultState {
 }
 
 /// The inputs and outputs of all devices.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SignalTable {
     /// `linesman.signals/1`.
@@ -126,7 +130,8 @@ pub struct SignalTable {
 }
 
 /// An input or output.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SignalState {
     /// Device and channel, from 1: `I1.3`. Inputs and outputs are counted on their own.
@@ -143,7 +148,8 @@ pub struct SignalState {
 }
 
 /// Seen from the device.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SignalDirection {
     /// The MainDevice reads it.

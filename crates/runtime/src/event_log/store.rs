@@ -148,7 +148,8 @@ pub struct StoredEntry {
 }
 
 /// What became of a finding; in the file as JSON.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LoggedFinding {
     /// Its name within the run: `F1`.

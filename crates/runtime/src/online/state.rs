@@ -19,11 +19,11 @@ const FORGIVEN_AFTER: Span = Span::s(1);
 /// What has happened on a line. Clones mean the same one.
 #[derive(Clone, Debug, Default)]
 pub struct OnlineState {
-    inner: Arc<Mutex<Inner>>,
+    inner: Arc<Mutex<OnlineShared>>,
 }
 
 #[derive(Debug, Default)]
-struct Inner {
+struct OnlineShared {
     on: String,
     watch: Option<Watch>,
     cards: Vec<Card>,
@@ -37,11 +37,11 @@ impl OnlineState {
     /// Of the line that is called so.
     #[must_use]
     pub fn new(on: &str) -> Self {
-        let inner = Inner { on: on.to_owned(), ..Inner::default() };
+        let inner = OnlineShared { on: on.to_owned(), ..OnlineShared::default() };
         Self { inner: Arc::new(Mutex::new(inner)) }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Inner> {
+    fn lock(&self) -> MutexGuard<'_, OnlineShared> {
         // Whoever panicked with it was counting: the counts are whole.
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -62,7 +62,7 @@ impl OnlineState {
     /// The host noticed something.
     pub fn host(&self, observation: &HostObservation) -> Vec<LogEntry> {
         let mut inner = self.lock();
-        let Inner { cards, watch, failed_at, .. } = &mut *inner;
+        let OnlineShared { cards, watch, failed_at, .. } = &mut *inner;
         let path = observation.path;
         while cards.len() <= path.index() {
             let path = if cards.is_empty() { "A" } else { "B" };

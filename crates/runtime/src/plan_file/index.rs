@@ -27,7 +27,7 @@ const MAX_LEN: u64 = 256 * 1024 * 1024;
 
 /// By what a file is known again.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Stamp {
+struct FileStamp {
     len: u64,
     /// Of its content, in ns since 1970.
     modified: i128,
@@ -36,7 +36,7 @@ struct Stamp {
     number: [u64; 2],
 }
 
-impl Stamp {
+impl FileStamp {
     fn of(about: &Metadata) -> Self {
         let ns = |s: i64, ns: i64| i128::from(s) * 1_000_000_000 + i128::from(ns);
         Self {
@@ -57,7 +57,7 @@ pub(super) struct Index {
     place: Option<PathBuf>,
     /// When it was written, in ns since 1970.
     written: i128,
-    files: BTreeMap<PathBuf, (Stamp, Vec<EsiHeader>)>,
+    files: BTreeMap<PathBuf, (FileStamp, Vec<EsiHeader>)>,
     changed: bool,
 }
 
@@ -78,21 +78,21 @@ impl Index {
         let Some(files) = fs::read_to_string(&place).ok().and_then(|text| parse(&text)) else {
             return none;
         };
-        Self { written: Stamp::of(&about).modified, files, ..none }
+        Self { written: FileStamp::of(&about).modified, files, ..none }
     }
 
     /// What is known of a file that is still the same.
     pub(super) fn known(&self, path: &Path, about: &Metadata) -> Option<&[EsiHeader]> {
         let (stamp, headers) = self.files.get(self.way(path))?;
         let old = stamp.modified.max(stamp.changed) + CLEARLY <= self.written;
-        (old && *stamp == Stamp::of(about)).then_some(headers.as_slice())
+        (old && *stamp == FileStamp::of(about)).then_some(headers.as_slice())
     }
 
     /// Notes what a file describes; `about` is from before it was read.
     pub(super) fn learn(&mut self, path: &Path, about: &Metadata, headers: &[EsiHeader]) {
         self.changed = true;
         let way = self.way(path).to_owned();
-        self.files.insert(way, (Stamp::of(about), headers.to_vec()));
+        self.files.insert(way, (FileStamp::of(about), headers.to_vec()));
     }
 
     fn way<'a>(&self, path: &'a Path) -> &'a Path {
@@ -122,7 +122,7 @@ impl Index {
             let Some(path) = path.to_str().filter(|path| !path.contains(['\n', '\t'])) else {
                 continue;
             };
-            let Stamp { len, modified, changed, number: [device, node] } = stamp;
+            let FileStamp { len, modified, changed, number: [device, node] } = stamp;
             let count = headers.len();
             let _ =
                 writeln!(text, "{len}\t{modified}\t{changed}\t{device}\t{node}\t{count}\t{path}");
@@ -137,7 +137,7 @@ impl Index {
     }
 }
 
-fn parse(text: &str) -> Option<BTreeMap<PathBuf, (Stamp, Vec<EsiHeader>)>> {
+fn parse(text: &str) -> Option<BTreeMap<PathBuf, (FileStamp, Vec<EsiHeader>)>> {
     let (body, sum) = text.trim_end_matches('\n').rsplit_once('\n')?;
     let body = text.get(..=body.len())?;
     if u32::from_str_radix(sum, 16).ok()? != crc32fast::hash(body.as_bytes()) {
@@ -150,7 +150,7 @@ fn parse(text: &str) -> Option<BTreeMap<PathBuf, (Stamp, Vec<EsiHeader>)>> {
     let mut files = BTreeMap::new();
     while let Some(line) = lines.next() {
         let mut parts = line.splitn(7, '\t');
-        let stamp = Stamp {
+        let stamp = FileStamp {
             len: parts.next()?.parse().ok()?,
             modified: parts.next()?.parse().ok()?,
             changed: parts.next()?.parse().ok()?,
@@ -210,7 +210,7 @@ mod tests {
         index.save(std::slice::from_ref(&path));
         let files = parse(&fs::read_to_string(&place).unwrap()).unwrap();
         let later = |written: i128| Index { written, files: files.clone(), ..Index::default() };
-        let now = Stamp::of(&about).changed;
+        let now = FileStamp::of(&about).changed;
         // Too fresh to be sure, then sure.
         assert_eq!(later(now + CLEARLY - 1).known(&path, &about), None);
         let sure = later(now + CLEARLY);

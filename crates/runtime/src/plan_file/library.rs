@@ -70,6 +70,21 @@ impl Library {
         std::mem::take(&mut self.notes)
     }
 
+    /// The type of a product by its description: of its revision, else of the newest one.
+    #[must_use]
+    pub fn type_of(
+        &self,
+        vendor_id: u32,
+        product_code: u32,
+        revision: Option<u32>,
+    ) -> Option<&str> {
+        let headers = self.index.iter().map(|(header, _)| header);
+        let fitting =
+            headers.filter(|one| (one.vendor_id, one.product_code) == (vendor_id, product_code));
+        let best = fitting.max_by_key(|one| (Some(one.revision) == revision, one.revision));
+        best.map(|one| one.type_name.as_str())
+    }
+
     /// What is known of a device of a project; nothing when no description fits.
     ///
     /// # Errors

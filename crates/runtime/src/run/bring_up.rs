@@ -6,7 +6,8 @@ use linesman_proto::time::Span;
 use serde::{Deserialize, Serialize};
 
 /// What bringing up took so far.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct BringUpReport {
     /// Until all SubDevices had reached their targets for the first time, in ns; `null`: they have not.
@@ -19,7 +20,8 @@ pub struct BringUpReport {
 }
 
 /// A step.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PhaseReport {
     /// Its name: `identify and address`, `set up for SAFEOP`, `change to OP`.
@@ -29,7 +31,8 @@ pub struct PhaseReport {
 }
 
 /// The steps of a SubDevice.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DeviceBringUp {
     /// Its number, from 1.

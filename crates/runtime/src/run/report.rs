@@ -14,7 +14,8 @@ use crate::serve::lateness::LatenessReport;
 pub const SCHEMA: &str = "linesman.run/1";
 
 /// How a run went, or goes.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RunReport {
     /// `linesman.run/1`.
@@ -54,7 +55,8 @@ pub struct RunReport {
 }
 
 /// A SubDevice of a running plan.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DeviceReport {
     /// Its number, from 1.
@@ -72,7 +74,8 @@ pub struct DeviceReport {
 }
 
 /// A cyclic frame.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct FrameReport {
     /// Its task.
@@ -86,9 +89,8 @@ pub struct FrameReport {
 }
 
 /// Counts since the start.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[allow(missing_docs, reason = "the names are those of Statistics, which explains them")]
 pub struct Counts {
@@ -117,7 +119,8 @@ pub struct Counts {
 }
 
 /// What the host granted.
-#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct HostReport {
     /// Real-time priority; `null`: none.

@@ -1,15 +1,12 @@
 //! Scan before a run, or by itself.
 
 use linesman_config::inventory::Inventory;
-use linesman_diagnosis::{FrameSeen, HostObservation};
 use linesman_link::error::LinkError;
-use linesman_maindevice::{Event, MainDevice};
-use linesman_proto::time::{Instant, Span};
-use linesman_session::SessionHooks;
+use linesman_proto::time::Span;
 pub use linesman_session::run::SCAN_PATIENCE as PATIENCE;
 
 use super::note::RunError;
-use crate::drive::Driver;
+use crate::service_session::ServiceSession;
 use crate::stop::Stop;
 use crate::transport::Transport;
 
@@ -22,46 +19,25 @@ pub fn scan<L: Transport<Error = LinkError>>(
     patience: Span,
     stop: &Stop,
 ) -> Result<Inventory, RunError> {
-    let settings = line.options();
-    let scanning = Scanning { begun: false, result: None };
-    let mut driver = Driver::new(line, settings, scanning);
-    let until = driver.now() + patience;
-    driver.run(until, stop)?;
-    let unfinished = || {
-        let why = if stop.is_set() {
-            "the scan was ended before it was done".to_owned()
-        } else {
-            format!("the scan was not done after {patience}")
-        };
-        Err(RunError::Scan(format!("{why}. Do: scan again")))
+    scan_with(&mut ServiceSession::new(line, None), patience, stop)
+}
+
+/// The same of a line that is served afterwards.
+///
+/// # Errors
+/// As [`scan`].
+pub fn scan_with<L: Transport<Error = LinkError>>(
+    session: &mut ServiceSession<L>,
+    patience: Span,
+    stop: &Stop,
+) -> Result<Inventory, RunError> {
+    if let Some(scanned) = session.scan(patience, stop)? {
+        return scanned.map_err(|error| RunError::Scan(error.to_string()));
+    }
+    let why = if stop.is_set() {
+        "the scan was ended before it was done".to_owned()
+    } else {
+        format!("the scan was not done after {patience}")
     };
-    driver.into_hooks().result.unwrap_or_else(unfinished)
-}
-
-/// Waits for the one result.
-struct Scanning {
-    begun: bool,
-    result: Option<Result<Inventory, RunError>>,
-}
-
-impl SessionHooks for Scanning {
-    fn frame(&mut self, _: &FrameSeen<'_>) {}
-
-    fn host(&mut self, _: &HostObservation) {}
-
-    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
-        if let Event::Scanned(inventory) = event {
-            self.result = Some(Ok(*inventory));
-        } else if let Event::ScanFailed(error) = event {
-            self.result = Some(Err(RunError::Scan(error.to_string())));
-        }
-    }
-
-    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
-        if !std::mem::replace(&mut self.begun, true) {
-            // It looks, with nothing but reads, before it writes.
-            main.scan(now);
-        }
-        self.result.is_none()
-    }
+    Err(RunError::Scan(format!("{why}. Do: scan again")))
 }

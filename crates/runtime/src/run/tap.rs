@@ -372,6 +372,7 @@ mod tests {
             number,
             fcs: None,
             truncated: false,
+            probe: None,
             bytes,
         }
     }

@@ -14,9 +14,8 @@ const DIGITS: u8 = 2;
 pub struct Lateness(Histogram<u64>);
 
 /// What is told of them.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct LatenessReport {
     /// How many frames.

@@ -51,7 +51,7 @@ pub struct Server {
     waker: Waker,
     batch: Batch,
     answer: Vec<u8>,
-    tally: Tally,
+    tally: ServeCounts,
     /// Nobody else answers on the cards meanwhile.
     _locks: Vec<CardLock>,
 }
@@ -67,7 +67,7 @@ pub struct ServeControls {
 
 /// What was counted so far.
 #[derive(Default)]
-struct Tally {
+struct ServeCounts {
     frames: Frames,
     real_time: bool,
     /// Time asleep.
@@ -106,7 +106,7 @@ impl Server {
             wiring,
             batch: Batch::new(BATCH),
             answer: Vec::new(),
-            tally: Tally::default(),
+            tally: ServeCounts::default(),
             _locks: locks,
         })
     }

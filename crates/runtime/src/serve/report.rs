@@ -8,7 +8,8 @@ use super::lateness::LatenessReport;
 pub const SCHEMA: &str = "linesman.sim/1";
 
 /// A segment on real interfaces: what went over them, and whether the host kept up.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Status {
     /// `linesman.sim/1`.
@@ -31,9 +32,8 @@ pub struct Status {
 }
 
 /// Frames of a run.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Frames {
     /// Came in.
@@ -49,7 +49,8 @@ pub struct Frames {
 }
 
 /// The host's share.
-#[derive(Clone, Copy, PartialEq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Host {
     /// Whether the system gave the segment a real-time priority.

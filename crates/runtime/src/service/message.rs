@@ -18,7 +18,8 @@ use crate::run::report::RunReport;
 pub const SCHEMA: &str = "linesman.service/1";
 
 /// What can be asked.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "do", rename_all = "kebab-case")]
 pub enum Request {
     /// How the run goes.
@@ -47,7 +48,8 @@ pub enum Request {
 }
 
 /// A service. Bytes are hexadecimal, lowest first: `"0a00"`.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "what", rename_all = "kebab-case")]
 #[allow(
     missing_docs,
@@ -114,7 +116,8 @@ pub enum Asked {
 }
 
 /// What is answered.
-#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
     /// `linesman.service/1`.
@@ -138,7 +141,8 @@ pub struct Answer {
 }
 
 /// By what code a SubDevice has said no.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RefusalCode {
     /// Whose code it is: `sdo-abort`, `foe-error`, `mailbox-error` or `al-status`.

@@ -23,7 +23,7 @@ const SHORT: Span = Span::ms(3);
 /// The cards of a MainDevice.
 pub struct Cards {
     clock: HostClock,
-    cards: Vec<Card>,
+    cards: Vec<OpenCard>,
     /// Frames that were sent and have not come back: so many are fetched without asking further.
     expected: usize,
     /// There may be something to fetch.
@@ -35,7 +35,7 @@ pub struct Cards {
     _locks: Vec<CardLock>,
 }
 
-struct Card {
+struct OpenCard {
     socket: RawSocket,
     watch: HostWatch,
     path: Path,
@@ -50,13 +50,13 @@ impl Cards {
         tighten_timers();
         let locks = names.iter().map(|name| CardLock::take(name)).collect::<Result<_, _>>()?;
         let open = |(path, name): (Path, &String)| {
-            Ok(Card {
+            Ok(OpenCard {
                 socket: RawSocket::open(name, &SocketOptions::default())?,
                 watch: HostWatch::open(name, path, &clock)?,
                 path,
             })
         };
-        let cards: Result<Vec<Card>, LinkError> =
+        let cards: Result<Vec<OpenCard>, LinkError> =
             Path::ALL.into_iter().zip(names).map(open).collect();
         let waker = Waker::new().map_err(|source| LinkError::System {
             interface: names.join("+"),

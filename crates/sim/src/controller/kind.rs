@@ -10,10 +10,10 @@ use crate::hardware::Hardware;
 
 /// A type of controller, ready to be used by any number of controllers. Cloning it shares it.
 #[derive(Clone, Debug)]
-pub struct ControllerKind(Arc<Inner>);
+pub struct ControllerKind(Arc<KindData>);
 
 #[derive(Debug)]
-struct Inner {
+struct KindData {
     hardware: Hardware,
     /// By the units of distributed clocks that are on.
     rights: [OnceLock<Arc<Rights>>; 8],
@@ -32,7 +32,7 @@ impl ControllerKind {
 
 impl From<Hardware> for ControllerKind {
     fn from(hardware: Hardware) -> Self {
-        Self(Arc::new(Inner { hardware, rights: Default::default() }))
+        Self(Arc::new(KindData { hardware, rights: Default::default() }))
     }
 }
 

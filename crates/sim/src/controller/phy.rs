@@ -55,7 +55,7 @@ pub enum PhyAction {
 #[derive(Clone, Debug)]
 pub(super) struct Phys {
     phys: PortMap<Option<Phy>>,
-    running: Option<Running>,
+    running: Option<PhyAccess>,
     write_enabled: bool,
     /// For the wires: what PHYs are going to do to their links, and when.
     actions: Vec<(Instant, Port, PhyAction)>,
@@ -70,7 +70,7 @@ struct Phy {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Running {
+struct PhyAccess {
     done_at: Instant,
     port: Option<Port>,
     register: u8,
@@ -210,7 +210,7 @@ impl Phys {
                 self.actions.push((done_at, port, action));
             }
         }
-        self.running = Some(Running { done_at, port, register, write });
+        self.running = Some(PhyAccess { done_at, port, register, write });
         put(control.with_busy(true).with_command(command), memory);
     }
 

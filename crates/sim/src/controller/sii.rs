@@ -50,7 +50,7 @@ pub(super) struct Sii {
     /// The small controller shows bit 4 of its status until it is in SAFEOP with the SII offered to
     /// the PDI: so recordings of real terminals have it; the data sheet calls the bit reserved.
     marks_first_owner: bool,
-    running: Option<Running>,
+    running: Option<RunningOperation>,
     programming_until: Instant,
     /// Write enable was given in the frame that is ending.
     write_enabled: bool,
@@ -66,13 +66,13 @@ pub(super) struct Sii {
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Running {
+struct RunningOperation {
     done_at: Instant,
-    operation: Operation,
+    operation: EepromOperation,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Operation {
+enum EepromOperation {
     Load { retries: u8 },
     Read { word: u32 },
     Write { word: u32, value: u16 },
@@ -153,7 +153,12 @@ impl Sii {
             .with_not_loaded(true);
         let mark = if self.marks_first_owner { FIRST_OWNER } else { 0 };
         put(SiiControl(control.0 | mark), memory);
-        self.run(at + STARTUP_DELAY, self.load_time(), Operation::Load { retries: 1 }, memory);
+        self.run(
+            at + STARTUP_DELAY,
+            self.load_time(),
+            EepromOperation::Load { retries: 1 },
+            memory,
+        );
     }
 
     pub(super) fn power_off(&mut self) {
@@ -202,17 +207,17 @@ impl Sii {
             SiiCommand::None => {}
             SiiCommand::Read => {
                 let time = self.expected.pop_front().unwrap_or_else(|| self.read_time());
-                self.run(at, time, Operation::Read { word }, memory);
+                self.run(at, time, EepromOperation::Read { word }, memory);
             }
             SiiCommand::Write if self.write_enabled => {
                 let time = WRITE_TIME + self.second_address_byte();
                 let time = self.expected.pop_front().unwrap_or(time);
-                self.run(at, time, Operation::Write { word, value }, memory);
+                self.run(at, time, EepromOperation::Write { word, value }, memory);
             }
             SiiCommand::Write => put(control.with_write_enable_error(true), memory),
             SiiCommand::Reload => {
                 let time = self.expected.pop_front().unwrap_or_else(|| self.load_time());
-                self.run(at, time, Operation::Load { retries: 1 }, memory);
+                self.run(at, time, EepromOperation::Load { retries: 1 }, memory);
             }
             SiiCommand::Reserved(_) => put(control.with_acknowledge_error(true), memory),
         }
@@ -229,8 +234,8 @@ impl Sii {
         let control = read(memory).with_busy(false).with_command(SiiCommand::None);
         put(control, memory);
         match running.operation {
-            Operation::Load { retries } => self.finish_load(retries, running.done_at, memory),
-            Operation::Read { word } => {
+            EepromOperation::Load { retries } => self.finish_load(retries, running.done_at, memory),
+            EepromOperation::Read { word } => {
                 let len = control.read_len();
                 let mut data = [0; 8];
                 for (offset, byte) in data[..len].iter_mut().enumerate() {
@@ -239,26 +244,27 @@ impl Sii {
                 memory.set_u64(&r::SII_DATA, u64::from_le_bytes(data));
                 Outcome::None
             }
-            Operation::Write { word, value } => {
+            EepromOperation::Write { word, value } => {
                 self.write(word, value);
                 self.programming_until = running.done_at + self.programming_time;
                 Outcome::None
             }
-            Operation::Unanswered => {
+            EepromOperation::Unanswered => {
                 put(control.with_acknowledge_error(true), memory);
                 Outcome::None
             }
         }
     }
 
-    fn run(&mut self, from: Instant, time: Span, operation: Operation, memory: &mut Memory) {
+    fn run(&mut self, from: Instant, time: Span, operation: EepromOperation, memory: &mut Memory) {
         let command = match operation {
-            Operation::Load { .. } => SiiCommand::Reload,
-            Operation::Read { .. } => SiiCommand::Read,
-            Operation::Write { .. } => SiiCommand::Write,
-            Operation::Unanswered => SiiCommand::None,
+            EepromOperation::Load { .. } => SiiCommand::Reload,
+            EepromOperation::Read { .. } => SiiCommand::Read,
+            EepromOperation::Write { .. } => SiiCommand::Write,
+            EepromOperation::Unanswered => SiiCommand::None,
         };
-        if self.emulated && !matches!(operation, Operation::Load { .. } if !self.loaded_once) {
+        if self.emulated && !matches!(operation, EepromOperation::Load { .. } if !self.loaded_once)
+        {
             // The processor hears of it and answers; until then the interface is busy.
             put(read(memory).with_busy(true).with_command(command), memory);
             return;
@@ -266,11 +272,14 @@ impl Sii {
         let answers = !self.image.is_empty() && from >= self.programming_until;
         let running = match operation {
             // A load has its own way to fail.
-            Operation::Load { .. } => Running { done_at: from + time, operation },
-            _ if answers => Running { done_at: from + time, operation },
-            Operation::Read { .. } | Operation::Write { .. } | Operation::Unanswered => {
-                Running { done_at: from + NO_ANSWER_TIME, operation: Operation::Unanswered }
-            }
+            EepromOperation::Load { .. } => RunningOperation { done_at: from + time, operation },
+            _ if answers => RunningOperation { done_at: from + time, operation },
+            EepromOperation::Read { .. }
+            | EepromOperation::Write { .. }
+            | EepromOperation::Unanswered => RunningOperation {
+                done_at: from + NO_ANSWER_TIME,
+                operation: EepromOperation::Unanswered,
+            },
         };
         self.running = Some(running);
         put(read(memory).with_busy(true).with_command(command), memory);
@@ -282,7 +291,7 @@ impl Sii {
         let stored = u16::from_le_bytes([area[14], area[15]]);
         let fits = stored == UNCHECKED || area[14] == checksum(&area[..14]);
         if (!answers || !fits) && retries > 0 {
-            self.run(at, self.load_time(), Operation::Load { retries: retries - 1 }, memory);
+            self.run(at, self.load_time(), EepromOperation::Load { retries: retries - 1 }, memory);
             return Outcome::None;
         }
         let control =

@@ -40,7 +40,7 @@ pub(super) enum Grant {
 
 /// What a SyncManager does with accesses.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-enum Kind {
+enum SyncManagerMode {
     /// Off, or of length 0: nothing.
     #[default]
     Off,
@@ -60,7 +60,7 @@ struct SyncManager {
     length: usize,
     control: SmControl,
     enabled: bool,
-    kind: Kind,
+    kind: SyncManagerMode,
     /// Completely written and not yet begun to be read.
     written: bool,
     /// Completely read and not yet begun to be written.
@@ -111,7 +111,7 @@ impl SyncManagers {
     pub(super) fn configure(&mut self, index: usize, memory: &mut Memory) {
         let config = config(index, memory);
         let manager = &mut self.all[index];
-        let kind = Kind::of(&config, memory.len());
+        let kind = SyncManagerMode::of(&config, memory.len());
         let restarts = manager.kind != kind || manager.enabled != config.activate.enable();
         manager.start = usize::from(config.start.0);
         manager.length = usize::from(config.length);
@@ -129,7 +129,7 @@ impl SyncManagers {
     fn list_guards(&mut self) {
         self.guard_count = 0;
         for (index, manager) in self.all.iter().enumerate() {
-            if manager.kind != Kind::Off {
+            if manager.kind != SyncManagerMode::Off {
                 self.guards[self.guard_count] = index as u8;
                 self.guard_count += 1;
             }
@@ -209,11 +209,11 @@ impl SyncManagers {
             return None;
         }
         let from = match manager.kind {
-            Kind::Off | Kind::Locked => return None,
-            Kind::Transparent => manager.start,
-            Kind::Buffered => manager.buffer(manager.last?),
-            Kind::Mailbox if manager.full => manager.start,
-            Kind::Mailbox => return None,
+            SyncManagerMode::Off | SyncManagerMode::Locked => return None,
+            SyncManagerMode::Transparent => manager.start,
+            SyncManagerMode::Buffered => manager.buffer(manager.last?),
+            SyncManagerMode::Mailbox if manager.full => manager.start,
+            SyncManagerMode::Mailbox => return None,
         };
         let len = manager.length.min(buffer.len());
         memory.copy_out(from, &mut buffer[..len]);
@@ -235,22 +235,22 @@ impl SyncManagers {
             return false;
         }
         let at = match manager.kind {
-            Kind::Off | Kind::Locked => return false,
-            Kind::Transparent => manager.start,
-            Kind::Buffered => {
+            SyncManagerMode::Off | SyncManagerMode::Locked => return false,
+            SyncManagerMode::Transparent => manager.start,
+            SyncManagerMode::Buffered => {
                 manager.writing = manager.free_buffer();
                 manager.last = Some(manager.writing);
                 manager.buffer(manager.writing)
             }
-            Kind::Mailbox if manager.full => return false,
-            Kind::Mailbox => {
+            SyncManagerMode::Mailbox if manager.full => return false,
+            SyncManagerMode::Mailbox => {
                 manager.full = true;
                 manager.start
             }
         };
         memory.copy_in(at, data);
         // Behind a message stays what was there before, as recordings of real mailboxes show.
-        if manager.kind != Kind::Mailbox {
+        if manager.kind != SyncManagerMode::Mailbox {
             memory.clear_range(at + data.len(), at + manager.length);
         }
         manager.read = false;
@@ -264,7 +264,8 @@ impl SyncManagers {
     /// it to be read has been heard. `shown` says whether the controller shows the buffer as open.
     pub(super) fn open_by_pdi(&mut self, index: usize, shown: bool, memory: &mut Memory) {
         let Some(manager) = self.all.get_mut(index) else { return };
-        let is_session = matches!(manager.kind, Kind::Buffered | Kind::Mailbox);
+        let is_session =
+            matches!(manager.kind, SyncManagerMode::Buffered | SyncManagerMode::Mailbox);
         if is_session && manager.is_read() && !manager.full {
             manager.read = false;
             manager.opened_by_pdi = shown;
@@ -288,7 +289,7 @@ pub(super) fn config(index: usize, memory: &Memory) -> SyncManagerConfig {
     SyncManagerConfig::from_bytes(memory.array(address(index)))
 }
 
-impl Kind {
+impl SyncManagerMode {
     fn of(config: &SyncManagerConfig, memory_len: usize) -> Self {
         if !config.activate.enable() || config.length == 0 {
             return Self::Off;
@@ -348,15 +349,17 @@ impl SyncManager {
             };
         }
         match self.kind {
-            Kind::Off => (until, Grant::Plain),
-            Kind::Locked => (until, Grant::Denied),
-            Kind::Transparent => {
+            SyncManagerMode::Off => (until, Grant::Plain),
+            SyncManagerMode::Locked => (until, Grant::Denied),
+            SyncManagerMode::Transparent => {
                 let noticed = write != self.is_read();
                 self.passing.started |= noticed;
                 self.passing.done |= noticed;
                 (until, Grant::Plain)
             }
-            Kind::Buffered | Kind::Mailbox => self.ask_session(at, until, write),
+            SyncManagerMode::Buffered | SyncManagerMode::Mailbox => {
+                self.ask_session(at, until, write)
+            }
         }
     }
 
@@ -393,9 +396,12 @@ impl SyncManager {
             }
         }
         let buffer = match self.kind {
-            Kind::Buffered if write => self.writing,
-            Kind::Buffered => self.reading,
-            Kind::Off | Kind::Locked | Kind::Transparent | Kind::Mailbox => 0,
+            SyncManagerMode::Buffered if write => self.writing,
+            SyncManagerMode::Buffered => self.reading,
+            SyncManagerMode::Off
+            | SyncManagerMode::Locked
+            | SyncManagerMode::Transparent
+            | SyncManagerMode::Mailbox => 0,
         };
         (until, Grant::At(self.buffer(buffer) + at - self.start))
     }
@@ -403,7 +409,7 @@ impl SyncManager {
     /// The start address is touched: whether an access may begin.
     fn begin(&mut self, write: bool) -> bool {
         self.open = match (self.kind, self.last) {
-            (Kind::Mailbox, _) => self.full != write && !self.passing.done,
+            (SyncManagerMode::Mailbox, _) => self.full != write && !self.passing.done,
             (_, _) if write => true,
             // Never written: there is nothing to read yet.
             (_, None) => false,
@@ -433,12 +439,15 @@ impl SyncManager {
                 self.read = true;
             }
             match self.kind {
-                Kind::Mailbox => self.full = written,
-                Kind::Buffered if written => {
+                SyncManagerMode::Mailbox => self.full = written,
+                SyncManagerMode::Buffered if written => {
                     self.last = Some(self.writing);
                     self.writing = self.free_buffer();
                 }
-                Kind::Buffered | Kind::Off | Kind::Locked | Kind::Transparent => {}
+                SyncManagerMode::Buffered
+                | SyncManagerMode::Off
+                | SyncManagerMode::Locked
+                | SyncManagerMode::Transparent => {}
             }
         }
         Settled { written, watchdog: written && self.control.watchdog() }
@@ -447,8 +456,11 @@ impl SyncManager {
     /// A mailbox has one buffer, the first, as real controllers show.
     fn last_shown(&self) -> Option<u8> {
         match self.kind {
-            Kind::Mailbox => Some(0),
-            Kind::Off | Kind::Locked | Kind::Transparent | Kind::Buffered => self.last,
+            SyncManagerMode::Mailbox => Some(0),
+            SyncManagerMode::Off
+            | SyncManagerMode::Locked
+            | SyncManagerMode::Transparent
+            | SyncManagerMode::Buffered => self.last,
         }
     }
 

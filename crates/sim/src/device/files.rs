@@ -87,13 +87,13 @@ enum Update {
 /// What becomes of a write.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Target {
-    place: Place,
+    place: FilePlace,
     /// The longest file that it takes, in bytes.
     pub limit: usize,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Place {
+enum FilePlace {
     File(usize),
     Firmware,
 }
@@ -102,7 +102,7 @@ impl Target {
     /// Whether the flash memory has to be erased first.
     #[must_use]
     pub fn is_firmware(&self) -> bool {
-        self.place == Place::Firmware
+        self.place == FilePlace::Firmware
     }
 }
 
@@ -153,7 +153,7 @@ impl Files {
         if let Some(slot) = self.firmware.as_ref().filter(|_| is_firmware_name(name)) {
             may(Where::Boot, slot.password, password, state)?;
             self.update = Update::Broken;
-            return Ok(Target { place: Place::Firmware, limit: slot.limit });
+            return Ok(Target { place: FilePlace::Firmware, limit: slot.limit });
         }
         let at = self.find(name)?;
         let file = &self.files[at];
@@ -161,7 +161,7 @@ impl Files {
         if file.limit == 0 {
             return Err(FoeErrorCode::ACCESS_DENIED);
         }
-        Ok(Target { place: Place::File(at), limit: file.limit })
+        Ok(Target { place: FilePlace::File(at), limit: file.limit })
     }
 
     /// The whole file has come.
@@ -170,12 +170,12 @@ impl Files {
     /// The FoE error: what has come is no firmware for this device, or damaged.
     pub fn finish_write(&mut self, target: Target, data: Vec<u8>) -> Result<(), FoeErrorCode> {
         match target.place {
-            Place::File(at) => {
+            FilePlace::File(at) => {
                 if let Some(file) = self.files.get_mut(at) {
                     file.data = Some(data);
                 }
             }
-            Place::Firmware => {
+            FilePlace::Firmware => {
                 let image = FirmwareImage::parse(&data)?;
                 let slot = self.firmware.as_ref();
                 if slot.is_none_or(|slot| !slot.type_name.eq_ignore_ascii_case(image.type_name)) {

@@ -88,7 +88,7 @@ pub struct Kind {
     pub place: PlaceRule,
     /// What it takes beside place and times.
     pub parameters: &'static [Parameter],
-    start: fn(Start<'_>) -> Result<Box<dyn Source>, FaultError>,
+    start: fn(ChangesSource<'_>) -> Result<Box<dyn Source>, FaultError>,
 }
 
 impl Kind {
@@ -169,7 +169,7 @@ pub fn kind(name: FaultName) -> Option<&'static Kind> {
 }
 
 /// What a kind makes its changes from.
-struct Start<'a> {
+struct ChangesSource<'a> {
     /// How errors call the entry.
     label: &'a str,
     name: FaultName,
@@ -180,7 +180,7 @@ struct Start<'a> {
     stream: Stream,
 }
 
-impl Start<'_> {
+impl ChangesSource<'_> {
     /// The span over which something is spread when no end is given.
     const OPEN_END: Span = Span::s(1);
 
@@ -221,7 +221,7 @@ impl FaultTemplate {
             0 => self.seed.stream(&self.stream),
             nth => self.seed.stream(&format!("{} time {nth}", self.stream)),
         };
-        (self.kind.start)(Start {
+        (self.kind.start)(ChangesSource {
             label: &self.label,
             name: self.kind.name,
             from: window.from,

@@ -92,7 +92,7 @@ impl Target {
 }
 
 /// What is written in `at`.
-enum Written {
+enum WrittenPlace {
     /// Both directions.
     Both(usize),
     /// One direction.
@@ -270,8 +270,8 @@ impl Finder<'_> {
         let path = match entry.at.as_ref().map(|at| at.as_slice()) {
             None => Path::A,
             Some([at]) => match self.written(at)? {
-                Written::Card(path) => path,
-                Written::Both(_) | Written::One(_) => {
+                WrittenPlace::Card(path) => path,
+                WrittenPlace::Both(_) | WrittenPlace::One(_) => {
                     return Err(self.error(format!("`{at}` is a link")));
                 }
             },
@@ -323,21 +323,21 @@ impl Finder<'_> {
         let mut target = Target::default();
         for at in given {
             match (self.written(at)?, self.kind.place) {
-                (Written::One(_), PlaceRule::Link | PlaceRule::RingLink) => {
+                (WrittenPlace::One(_), PlaceRule::Link | PlaceRule::RingLink) => {
                     return Err(self.error(format!("`{at}` is one direction")));
                 }
-                (Written::Both(_), PlaceRule::Direction | PlaceRule::Entrance) => {
+                (WrittenPlace::Both(_), PlaceRule::Direction | PlaceRule::Entrance) => {
                     return Err(self.error(format!("`{at}` is both directions")));
                 }
-                (Written::Card(path), _) => {
+                (WrittenPlace::Card(path), _) => {
                     return Err(self.error(format!("nothing is plugged into card {path}")));
                 }
-                (Written::One(direction), _) => {
+                (WrittenPlace::One(direction), _) => {
                     target.places.push(self.context.world.direction_place(direction));
                     target.directions.push(direction);
                     target.links.push(direction.link);
                 }
-                (Written::Both(link), _) => {
+                (WrittenPlace::Both(link), _) => {
                     target.places.push(self.context.world.link_place(link));
                     target.directions.extend(DirectedLink::both(link));
                     target.links.push(link);
@@ -349,7 +349,7 @@ impl Finder<'_> {
 
     /// Reads `K1.C>B3.A`, `K1.C-B3.A`, or one end of a link. Names may contain either sign: every
     /// way to part the text is tried.
-    fn written(&self, at: &str) -> Result<Written, FaultError> {
+    fn written(&self, at: &str) -> Result<WrittenPlace, FaultError> {
         let parts = |sign: char| {
             at.match_indices(sign).map(|(index, _)| (at[..index].trim(), at[index + 1..].trim()))
         };
@@ -357,22 +357,22 @@ impl Finder<'_> {
             if let (Some(from), Some(to)) = (self.end(from), self.end(to)) {
                 let link = self.link_between(at, from, to)?;
                 let downstream = self.context.tree.links()[link].upstream == from;
-                return Ok(Written::One(DirectedLink { link, downstream }));
+                return Ok(WrittenPlace::One(DirectedLink { link, downstream }));
             }
         }
         for (one, other) in parts('-') {
             if let (Some(one), Some(other)) = (self.end(one), self.end(other)) {
-                return self.link_between(at, one, other).map(Written::Both);
+                return self.link_between(at, one, other).map(WrittenPlace::Both);
             }
         }
         match self.end(at) {
             Some(End::MainDevice(path))
                 if matches!(self.kind.place, PlaceRule::Card | PlaceRule::DeviceOrCard) =>
             {
-                Ok(Written::Card(path))
+                Ok(WrittenPlace::Card(path))
             }
             Some(end) => match self.context.tree.link_at(end) {
-                Some(link) => Ok(Written::Both(link)),
+                Some(link) => Ok(WrittenPlace::Both(link)),
                 None => Err(self.error(format!("no link is plugged in at `{at}`"))),
             },
             None => Err(self.error(self.unknown_end(at))),

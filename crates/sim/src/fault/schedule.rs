@@ -127,7 +127,7 @@ pub(super) fn windows(
     earliest: Instant,
     stream: Stream,
 ) -> Result<Windows, FaultError> {
-    let check = Check { label };
+    let check = ScheduleCheck { label };
     let at = |ms: f64| Instant::from_nanos((ms * 1e6) as u64);
     for (key, value) in [("from_ms", entry.from_ms), ("to_ms", entry.to_ms)] {
         check.range(key, value, 0.0)?;
@@ -169,11 +169,11 @@ pub(super) fn windows(
     Ok(Windows { rhythm, stays, burst, times, ..Windows::once(from, to) })
 }
 
-struct Check<'a> {
+struct ScheduleCheck<'a> {
     label: &'a str,
 }
 
-impl Check<'_> {
+impl ScheduleCheck<'_> {
     fn value(&self, key: &str, given: String, allowed: String) -> FaultError {
         FaultError::Value { entry: self.label.to_owned(), key: key.to_owned(), given, allowed }
     }

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use linesman_proto::time::{Instant, Span};
 
-use super::{Parameter, Shape, Start};
+use super::{ChangesSource, Parameter, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, DirectedLink, Source};
 
@@ -27,7 +27,7 @@ pub(super) const PORT_CIRCUIT: &[Parameter] = &[
 
 /// Damage that always acts, whatever is moved or switched: `hits` spoiled frames if so many were
 /// asked for, else `hits_per_s` destroyed symbols.
-pub(super) fn steady(start: &Start<'_>, directions: Vec<DirectedLink>) -> Box<dyn Source> {
+pub(super) fn steady(start: &ChangesSource<'_>, directions: Vec<DirectedLink>) -> Box<dyn Source> {
     let mut stream = start.stream.clone();
     if let Some(count) = start.values.whole(HITS.key) {
         return frame_hits(count, start.interval(), &directions, &mut stream);

@@ -157,6 +157,7 @@ fn assemble(
     let mut world = World::new(&tree, made, &cable_lengths(file, &placed, &tree), signals);
     for (wired, link) in tree.links().iter().zip(&mut world.links) {
         link.medium = medium(file, &placed, wired);
+        link.link_up = link_up(file, &placed, link);
     }
     world.plug_noise =
         PlugNoise::new(file.noise_at_link_up.unwrap_or(0.0), seed.stream("plug noise"));
@@ -242,6 +243,16 @@ fn medium(file: &SegmentFile, placed: &[Placed], wired: &Link) -> Medium {
         None => file.ring.as_ref().and_then(|ring| ring.medium),
     };
     medium.unwrap_or_default()
+}
+
+/// The time in which the link of a cable comes up, where the file says it.
+fn link_up(file: &SegmentFile, placed: &[Placed], link: &crate::wire::Link) -> Option<Span> {
+    let planned = &placed[link.downstream.node()?].planned;
+    if planned.part != 0 || link.kind != PortKind::Mii {
+        return None;
+    }
+    let ms = file.devices[planned.device].link_up_ms?;
+    Some(Span::us((ms * 1e3) as u64))
 }
 
 /// Error counters start as the file says.

@@ -6,6 +6,7 @@
 
 mod build;
 mod build_deviations;
+mod capture_probe;
 pub(crate) mod card;
 mod from_controllers;
 mod identification;
@@ -24,6 +25,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 
 pub use build::BuildError;
+pub use capture_probe::{ProbeFrame, ProbePlaceError};
 pub use card::{FrameTally, HostPort};
 pub use plug::PlugError;
 pub use tx_capture::Outgoing;

@@ -38,9 +38,13 @@ pub(super) fn lay(
     Ok(())
 }
 
-type Pairs = Vec<(SignalId, SignalId)>;
+type SignalPairs = Vec<(SignalId, SignalId)>;
 
-fn pairs(wire: &SignalWire, outputs: &[SignalId], inputs: &[SignalId]) -> Result<Pairs, String> {
+fn pairs(
+    wire: &SignalWire,
+    outputs: &[SignalId],
+    inputs: &[SignalId],
+) -> Result<SignalPairs, String> {
     let outputs = from(&wire.from, "output", wire.output, outputs)?;
     let inputs = from(&wire.to, "input", wire.input, inputs)?;
     let count = if wire.output.is_some() { 1 } else { usize::MAX };

@@ -7,23 +7,24 @@ use crate::controller::LocalClock;
 use linesman_proto::time::Span;
 
 /// The quartz of a device: what is not said is by chance.
-#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentClock {
     /// How its speed changes while it warms up, in ppm per second, -10 to 10; by chance within 0.02
     /// unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -10.0, max = 10.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = -10.0, max = 10.0)))]
     pub ramp_ppm_per_s: Option<f64>,
     /// How long that lasts after power-on, in seconds, 0 to 10,000; by chance from 60 to 300 unless
     /// said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0.0, max = 10000.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 10000.0)))]
     pub ramp_s: Option<f64>,
     /// How far a time that it takes can be off either way, in ns, 0 to 1,000; by chance up to 6
     /// unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(max = 1000))]
+    #[cfg_attr(feature = "schema", schemars(range(max = 1000)))]
     pub jitter_ns: Option<u16>,
     /// What it shows at power-on, in ns; by chance up to 1,000 s unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -21,6 +21,8 @@ pub(crate) const DEFAULT_CABLE_M: f64 = 5.0;
 const MOST_REPEATS: u32 = 65_535;
 /// The longest cable: glass fibre.
 const LONGEST_CABLE_M: f64 = 2_000.0;
+/// Longest time in which a link comes up.
+const LONGEST_LINK_UP_MS: f64 = 10_000.0;
 
 /// A controller that is planned.
 #[derive(Clone, PartialEq, Debug)]
@@ -206,6 +208,9 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
         };
         if let Some(length) = device.cable_m.filter(|m| !(0.0..=LONGEST_CABLE_M).contains(m)) {
             return Err(out_of_range("cable_m", length, "0 to 2000"));
+        }
+        if let Some(ms) = device.link_up_ms.filter(|ms| !(0.0..=LONGEST_LINK_UP_MS).contains(ms)) {
+            return Err(out_of_range("link_up_ms", ms, "0 to 10000"));
         }
         if let Some(ppm) = device.clock_ppm.filter(|ppm| !(-200.0..=200.0).contains(ppm)) {
             return Err(out_of_range("clock_ppm", ppm, "-200 to 200"));

@@ -50,7 +50,8 @@ pub use value::{OneOrMany, Value};
 use crate::wire::Medium;
 
 /// A segment, as described.
-#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentFile {
     /// What the segment is called.
@@ -69,7 +70,7 @@ pub struct SegmentFile {
     /// Mean number of symbols that are destroyed on each line of a link when it comes up during the
     /// run: contacts bounce. None unless said.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1000.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 1000.0)))]
     pub noise_at_link_up: Option<f64>,
     /// Power supplies that feed several devices, to fail together.
     #[serde(default, rename = "supply")]
@@ -93,7 +94,8 @@ pub struct SegmentFile {
 }
 
 /// A device of a segment.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentDevice {
     /// Unique name.
@@ -102,7 +104,7 @@ pub struct SegmentDevice {
     /// one before, by the first port of the kind by which it is entered itself. What the other keys
     /// say holds for each; a serial number is counted up. What comes behind hangs on the last.
     #[serde(default)]
-    #[schemars(range(min = 1, max = 65535))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 1, max = 65535)))]
     pub repeat: Option<u32>,
     /// Type in the library, such as `EL2004`, `esi:FILE#TYPE@REVISION` from a description
     /// of its maker, or `sii:FILE`: the device whose EEPROM that file holds.
@@ -112,13 +114,18 @@ pub struct SegmentDevice {
     pub on: Attachment,
     /// The port by which it is entered, `A` unless said.
     #[serde(default)]
-    #[schemars(regex(pattern = "^[A-D]$"))]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^[A-D]$")))]
     pub entry: Option<String>,
     /// Length of the cable to it in metres, 0 to 2,000; 5 unless said. A terminal on the E-bus has
     /// none.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 2000.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 2000.0)))]
     pub cable_m: Option<f64>,
+    /// Time from the signal to the link on its cable in ms, 0 to 10,000: auto-negotiation of the two PHYs;
+    /// as its type and that of its neighbour have it unless said. A terminal on the E-bus has none.
+    #[serde(default)]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 10000.0)))]
+    pub link_up_ms: Option<f64>,
     /// The hot connect group it belongs to; faults can name all of it as `group:NAME`.
     #[serde(default)]
     pub group: Option<String>,
@@ -134,7 +141,7 @@ pub struct SegmentDevice {
     pub id: Option<u16>,
     /// How much too fast its clock runs, in ppm, -200 to 200; by chance within 25 unless said.
     #[serde(default)]
-    #[schemars(range(min = -200.0, max = 200.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = -200.0, max = 200.0)))]
     pub clock_ppm: Option<f64>,
     /// What its cable is made of: `direct` (copper, E-bus contacts), `fibre`, or `converters`, a pair
     /// of media converters; `direct` unless said.
@@ -167,14 +174,15 @@ pub struct SegmentDevice {
 }
 
 /// The far end of a ring.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentRing {
     /// The port that is wired to the second card, such as `B9.B`.
     pub closes_at: Attachment,
     /// Length of the cable in metres, 0 to 2,000; 5 unless said.
     #[serde(default)]
-    #[schemars(range(min = 0.0, max = 2000.0))]
+    #[cfg_attr(feature = "schema", schemars(range(min = 0.0, max = 2000.0)))]
     pub cable_m: Option<f64>,
     /// What it is made of, as for a device.
     #[serde(default)]
@@ -182,7 +190,8 @@ pub struct SegmentRing {
 }
 
 /// A power supply and the devices that it feeds.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Supply {
     /// Unique name.
@@ -192,10 +201,11 @@ pub struct Supply {
 }
 
 /// A fault of a segment: kind, place, times, and the parameters of its kind.
-#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct FaultEntry {
     /// A fault name, such as `emc-noise`.
-    #[schemars(schema_with = "kinds_schema")]
+    #[cfg_attr(feature = "schema", schemars(schema_with = "kinds_schema"))]
     pub kind: String,
     /// A link `K1.C-B3.A`, one direction of it `K1.C>B3.A`, or a list of those.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -223,6 +233,7 @@ pub struct FaultEntry {
     pub parameters: BTreeMap<String, Value>,
 }
 
+#[cfg(feature = "schema")]
 fn kinds_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
     let names: Vec<&str> = crate::fault::KINDS.iter().map(|kind| kind.name.name()).collect();
     schemars::json_schema!({ "type": "string", "enum": names })
@@ -374,6 +385,7 @@ impl SegmentDevice {
             repeat: None,
             entry: None,
             cable_m: None,
+            link_up_ms: None,
             group: None,
             serial: None,
             alias: None,

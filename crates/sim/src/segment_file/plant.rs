@@ -53,7 +53,7 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
     let low = options.min_devices.max(1) as u64;
     let target = stream.between(low, options.max_devices as u64) as usize;
     let old_counters = stream.chance(0.25);
-    let mut builder = Builder::new(stream, target, options.all_types);
+    let mut builder = PlantBuilder::new(stream, target, options.all_types);
     builder.build(options.junction);
     let ring = if options.ring { builder.ring() } else { None };
     let file = SegmentFile {
@@ -69,7 +69,7 @@ pub fn plant(seed: Seed, options: &PlantOptions) -> SegmentFile {
 
 /// What a type is good for.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Use {
+enum TypeUse {
     /// From a cable to the E-bus.
     Coupler,
     /// On the E-bus, with ways on by cable: how many.
@@ -84,39 +84,39 @@ enum Use {
     None,
 }
 
-fn use_of(library_type: &LibraryType) -> Use {
-    let Some(first) = library_type.ports().next() else { return Use::None };
+fn use_of(library_type: &LibraryType) -> TypeUse {
+    let Some(first) = library_type.ports().next() else { return TypeUse::None };
     if library_type.fast_hot_connect() {
         // It fits its like only, and never the first cable.
-        return Use::None;
+        return TypeUse::None;
     }
     let ways = |kind| ports_after(Port::A).into_iter().filter(|port| first[*port] == kind).count();
     let (ebus, cable) = (ways(PortKind::Ebus), ways(PortKind::Mii));
     let single = library_type.inner_links().is_empty();
     match (first[Port::A], ebus, cable) {
-        (PortKind::Mii, 1.., 1..) if single => Use::Coupler,
-        (PortKind::Mii, _, 2..) => Use::Junction,
-        (PortKind::Mii, 0, 1) => Use::Box,
-        (PortKind::Ebus, _, 1..) => Use::EbusJunction(cable),
-        (PortKind::Ebus, 1.., 0) => Use::Terminal,
-        (PortKind::Mii | PortKind::Ebus | PortKind::Absent, _, _) => Use::None,
+        (PortKind::Mii, 1.., 1..) if single => TypeUse::Coupler,
+        (PortKind::Mii, _, 2..) => TypeUse::Junction,
+        (PortKind::Mii, 0, 1) => TypeUse::Box,
+        (PortKind::Ebus, _, 1..) => TypeUse::EbusJunction(cable),
+        (PortKind::Ebus, 1.., 0) => TypeUse::Terminal,
+        (PortKind::Mii | PortKind::Ebus | PortKind::Absent, _, _) => TypeUse::None,
     }
 }
 
 /// Where a cable can be plugged in.
 #[derive(Clone, Debug)]
-struct Socket {
+struct FreePort {
     on: Attachment,
     /// How many stations lie between it and the MainDevice.
     depth: usize,
 }
 
-struct Builder {
+struct PlantBuilder {
     stream: Stream,
     target: usize,
     controllers: usize,
     devices: Vec<SegmentDevice>,
-    sockets: Vec<Socket>,
+    sockets: Vec<FreePort>,
     couplers: Vec<&'static LibraryType>,
     terminals: Vec<&'static LibraryType>,
     boxes: Vec<&'static LibraryType>,
@@ -124,14 +124,14 @@ struct Builder {
     ebus_junctions: Vec<&'static LibraryType>,
 }
 
-impl Builder {
+impl PlantBuilder {
     fn new(stream: Stream, target: usize, all_types: bool) -> Self {
         let types: Vec<&'static LibraryType> = if all_types {
             library::types().collect()
         } else {
             COMMON.iter().filter_map(|name| library::find(name)).collect()
         };
-        let of = |wanted: fn(Use) -> bool| {
+        let of = |wanted: fn(TypeUse) -> bool| {
             types.iter().copied().filter(|known| wanted(use_of(known))).collect::<Vec<_>>()
         };
         Self {
@@ -139,12 +139,12 @@ impl Builder {
             target,
             controllers: 0,
             devices: Vec::new(),
-            sockets: vec![Socket { on: Attachment::MainDevice(Path::A), depth: 0 }],
-            couplers: of(|what| what == Use::Coupler),
-            terminals: of(|what| what == Use::Terminal),
-            boxes: of(|what| what == Use::Box),
-            junctions: of(|what| what == Use::Junction),
-            ebus_junctions: of(|what| matches!(what, Use::EbusJunction(_))),
+            sockets: vec![FreePort { on: Attachment::MainDevice(Path::A), depth: 0 }],
+            couplers: of(|what| what == TypeUse::Coupler),
+            terminals: of(|what| what == TypeUse::Terminal),
+            boxes: of(|what| what == TypeUse::Box),
+            junctions: of(|what| what == TypeUse::Junction),
+            ebus_junctions: of(|what| matches!(what, TypeUse::EbusJunction(_))),
         }
     }
 
@@ -177,7 +177,7 @@ impl Builder {
         }
     }
 
-    fn put_junction(&mut self, socket: &Socket) -> bool {
+    fn put_junction(&mut self, socket: &FreePort) -> bool {
         let room = self.room();
         let fits: Vec<_> =
             self.junctions.iter().copied().filter(|kind| kind.ports().count() <= room).collect();
@@ -196,7 +196,7 @@ impl Builder {
         true
     }
 
-    fn put_box(&mut self, socket: &Socket) -> bool {
+    fn put_box(&mut self, socket: &FreePort) -> bool {
         let Some(kind) = self.stream.pick(&self.boxes).copied() else { return false };
         let name = self.put(kind, socket.on.clone(), true);
         self.open_cables(&name, kind, socket.depth + 1);
@@ -204,7 +204,7 @@ impl Builder {
     }
 
     /// A coupler and its terminals, as many as its supply carries.
-    fn put_station(&mut self, socket: &Socket, junction: bool) {
+    fn put_station(&mut self, socket: &FreePort, junction: bool) {
         let Some(coupler) = self.stream.pick(&self.couplers).copied() else { return };
         let name = self.put(coupler, socket.on.clone(), true);
         let Some(ports) = coupler.ports().next() else { return };
@@ -246,7 +246,7 @@ impl Builder {
 
     fn open(&mut self, name: &str, port: Port, depth: usize) {
         let on = Attachment::Device { name: name.to_owned(), port };
-        self.sockets.push(Socket { on, depth });
+        self.sockets.push(FreePort { on, depth });
     }
 
     /// Puts a device in and gives its name for the time being.
@@ -288,11 +288,11 @@ fn in_order(mut file: SegmentFile) -> SegmentFile {
     let mut names = Vec::with_capacity(order.len());
     for device in &order {
         let found = library::find(&file.devices[*device].type_name);
-        let letter = match found.map_or(Use::None, use_of) {
-            Use::Coupler => 'K',
-            Use::Terminal => 'T',
-            Use::Junction | Use::EbusJunction(_) => 'J',
-            Use::Box | Use::None => 'B',
+        let letter = match found.map_or(TypeUse::None, use_of) {
+            TypeUse::Coupler => 'K',
+            TypeUse::Terminal => 'T',
+            TypeUse::Junction | TypeUse::EbusJunction(_) => 'J',
+            TypeUse::Box | TypeUse::None => 'B',
         };
         names.push((file.devices[*device].name.clone(), format!("{letter}{no}")));
         no += found.map_or(1, |found| found.ports().count());

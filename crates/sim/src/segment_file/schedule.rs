@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// All times are in ms and count from the fault's own begin (`from_ms`, or the moment it is
 /// injected). At most one of `at_ms`, `every_ms` and `random` can be said.
-#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Schedule {
     /// It comes at these times, in ms after its begin: one or a list that rises.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -29,7 +30,8 @@ pub struct Schedule {
 }
 
 /// One time or several.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum Times {
     /// One.
@@ -50,7 +52,8 @@ impl Times {
 }
 
 /// It comes by chance.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RandomTimes {
     /// Mean time from its end to its next begin, in ms.
@@ -62,7 +65,8 @@ pub struct RandomTimes {
 }
 
 /// It comes several times in quick succession.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct BurstTimes {
     /// How many times.

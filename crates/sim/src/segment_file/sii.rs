@@ -6,9 +6,8 @@ use crate::device::EmulatedSii;
 use crate::device::library::Built;
 
 /// Where the SII of a device lies, and who reads it.
-#[derive(
-    Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SiiPlace {
     /// In an EEPROM that nobody but controller and MainDevice reads.

@@ -216,6 +216,7 @@ fn plants_keep_to_their_options() {
     assert_eq!(plant(Seed(1), &one).devices.len(), 1);
 }
 
+#[cfg(feature = "schema")]
 #[test]
 fn the_schema_names_what_can_be_written() {
     let schema = schemars::schema_for!(SegmentFile);

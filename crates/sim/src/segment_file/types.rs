@@ -99,7 +99,7 @@ impl SegmentFile {
         files: &dyn DescriptionFiles,
     ) -> Result<(), SegmentFileError> {
         let mut types = DescribedTypes::default();
-        let mut reader = Reader { files, parsed: BTreeMap::new() };
+        let mut reader = TypeReader { files, parsed: BTreeMap::new() };
         for device in &self.devices {
             types.read(&device.type_name, device.slots.as_deref(), &mut reader).map_err(
                 |source| SegmentFileError::Type {
@@ -144,12 +144,12 @@ fn is_in_file(type_name: &str) -> bool {
 }
 
 /// Files, and the descriptions in those that have been read: one file has hundreds of them.
-struct Reader<'a> {
+struct TypeReader<'a> {
     files: &'a dyn DescriptionFiles,
     parsed: BTreeMap<String, Arc<Esi>>,
 }
 
-impl Reader<'_> {
+impl TypeReader<'_> {
     fn bytes(&self, name: &str) -> Result<Vec<u8>, TypeError> {
         let failed = |reason| TypeError::File { name: name.to_owned(), reason };
         self.files.read(name).map_err(failed)
@@ -174,7 +174,7 @@ impl DescribedTypes {
         &mut self,
         type_name: &str,
         slots: Option<&[String]>,
-        reader: &mut Reader<'_>,
+        reader: &mut TypeReader<'_>,
     ) -> Result<(), TypeError> {
         let key = (type_name.to_owned(), slots.map(<[String]>::to_vec));
         if self.0.contains_key(&key) {

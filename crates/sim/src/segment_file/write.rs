@@ -68,6 +68,9 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
     if let Some(cable_m) = device.cable_m {
         line("cable_m", number(cable_m));
     }
+    if let Some(ms) = device.link_up_ms {
+        line("link_up_ms", number(ms));
+    }
     if let Some(group) = &device.group {
         line("group", quoted(group));
     }

@@ -15,6 +15,7 @@ use crate::device::Refusal;
 use crate::truth::{Cause, Effect, FaultId, Place};
 
 impl World {
+    // Long for its number of changes: one short arm each.
     pub(super) fn apply(&mut self, at: Instant, fault: FaultId, change: Change) {
         match change {
             Change::Hit { direction, flip } => self.hit(at, fault, direction, flip),

@@ -99,17 +99,8 @@ pub(super) enum EndState {
 }
 
 /// What a link is made of between its ends.
-#[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Default,
-    Debug,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Medium {
     /// Contacts of the E-bus, or two pairs of copper with autonegotiation (100BASE-TX): an end that
@@ -137,6 +128,8 @@ pub struct Link {
     pub transit: Span,
     /// What it is made of between its ends.
     pub medium: Medium,
+    /// Time from the signal to the open loop; that of the slower end unless it is said.
+    pub link_up: Option<Span>,
     /// The contact: both directions.
     pub contact: OutageHistory,
     /// A pair of wires or a fibre by itself, upstream line first: broken, its receiver has no signal.
@@ -171,6 +164,7 @@ impl Link {
             kind,
             transit,
             medium: Medium::Direct,
+            link_up: None,
             contact: OutageHistory::default(),
             pair: [OutageHistory::default(), OutageHistory::default()],
             passage: [OutageHistory::default(), OutageHistory::default()],

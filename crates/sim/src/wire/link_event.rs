@@ -237,6 +237,9 @@ impl World {
     }
 
     pub(super) fn link_up_time(&self, link: usize) -> Span {
+        if let Some(said) = self.links[link].link_up {
+            return said;
+        }
         let times = self.links[link].both_ends().map(|end| match end {
             End::MainDevice(path) => self.cards[path.index()].link_up,
             End::Controller(node, _) => {

@@ -12,6 +12,7 @@ mod address;
 mod address_cache;
 mod address_directory;
 mod apply;
+pub(crate) mod capture_probe;
 pub mod change;
 mod fast_path;
 pub mod foreign_sender;

@@ -14,6 +14,7 @@ use linesman_proto::register::{self as r, ErrorCounter};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 
+use super::capture_probe::ProbeView;
 use super::change::DirectedLink;
 use super::world::World;
 use crate::controller::{CountKind, Forwarding, PortEvent};
@@ -148,6 +149,25 @@ impl World {
         at: Instant,
         in_transit: &mut FrameInTransit,
     ) -> Crossing {
+        let mut view = self.probe_view(direction, &in_transit.frame);
+        let crossing = self.cross_by(direction, at, in_transit, view.as_deref_mut());
+        if let Some(view) = view
+            && (matches!(crossing, Crossing::Through { .. }) || !view.is_at_receiver())
+        {
+            self.passes_probe(*view, direction, at);
+        }
+        crossing
+    }
+
+    /// Carries a frame along a line, past a capture probe if one is looped in.
+    #[inline]
+    fn cross_by(
+        &mut self,
+        direction: DirectedLink,
+        at: Instant,
+        in_transit: &mut FrameInTransit,
+        mut view: Option<&mut ProbeView>,
+    ) -> Crossing {
         let link = &self.links[direction.link];
         let arrives = at + link.transit;
         let duration = in_transit.frame.duration();
@@ -163,13 +183,16 @@ impl World {
                     in_transit.frame.damage.cut_off = true;
                     in_transit.spoiled_by.get_or_insert(fault);
                     spoiled = true;
+                    if let Some(view) = view.as_deref_mut().filter(|view| view.is_at_receiver()) {
+                        view.cut_off(bytes);
+                    }
                 }
                 Some(_) | None => return Crossing::Lost,
             }
         }
         let noise = &self.links[direction.link].noise[usize::from(direction.downstream)];
         if !noise.is_quiet() {
-            match self.disturb(direction, arrives, duration, in_transit) {
+            match self.disturb(direction, arrives, duration, in_transit, view) {
                 Some(hit) => spoiled |= hit,
                 None => return Crossing::Lost,
             }
@@ -184,6 +207,7 @@ impl World {
         arrives: Instant,
         duration: Span,
         in_transit: &mut FrameInTransit,
+        mut view: Option<&mut ProbeView>,
     ) -> Option<bool> {
         let place = self.direction_place(direction);
         let noise = &mut self.links[direction.link].noise[usize::from(direction.downstream)];
@@ -194,6 +218,7 @@ impl World {
         for hit in hits {
             let offset = hit.at.since(arrives);
             starts &= !is_start_delimiter(offset);
+            self.show_hit(view.as_deref_mut(), direction, offset, hit.flip, hit.fault);
             self.spoil(hit.at, offset, hit.flip, hit.fault, place, in_transit);
             spoiled = true;
         }
@@ -202,6 +227,7 @@ impl World {
             let byte = PREAMBLE_LEN as u64 + bytes * u64::from(frame_error.part) / (1 << 16);
             let offset = Span::ns(byte * BYTE_NS);
             self.symbol_error(arrives + offset, Cause::Fault(frame_error.fault), direction);
+            self.show_hit(view, direction, offset, frame_error.flip, frame_error.fault);
             let at = arrives + offset;
             self.spoil(at, offset, frame_error.flip, frame_error.fault, place, in_transit);
             spoiled = true;
@@ -212,6 +238,22 @@ impl World {
             return None;
         }
         Some(spoiled)
+    }
+
+    /// A capture probe sees what happens to a frame before it.
+    fn show_hit(
+        &self,
+        view: Option<&mut ProbeView>,
+        direction: DirectedLink,
+        offset: Span,
+        flip: u8,
+        fault: FaultId,
+    ) {
+        if let Some(view) = view
+            && self.is_before_probe(view, direction, fault)
+        {
+            view.spoil(offset, flip);
+        }
     }
 
     /// A receiver sees a frame without a start: some count it, none passes it on.

@@ -4,6 +4,7 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
+use super::capture_probe::LoopedProbe;
 use super::change::{Change, DirectedLink};
 use super::fast_path::FastPath;
 use super::foreign_sender::ForeignSenders;
@@ -50,6 +51,8 @@ pub(crate) struct World {
     pub(super) changed_at: Instant,
     /// What frames can be spared of the walk.
     pub(crate) fast_path: FastPath,
+    /// A capture probe, where one is looped in.
+    pub(crate) capture_probe: Option<LoopedProbe>,
 }
 
 impl World {
@@ -79,6 +82,7 @@ impl World {
             noisy: Vec::new(),
             changed_at: Instant::ZERO,
             fast_path: FastPath::default(),
+            capture_probe: None,
         };
         for (index, wired) in tree.links().iter().enumerate() {
             world.plug(*wired, index, cable_m.get(index).copied().unwrap_or(0.0));
@@ -119,7 +123,7 @@ impl World {
     }
 
     /// What both ports of a link add to its transit: half a crossing each.
-    fn ports(&self, one: End, other: End, kind: PortKind) -> Span {
+    pub(super) fn ports(&self, one: End, other: End, kind: PortKind) -> Span {
         let crossing = |end: End| match end {
             End::MainDevice(path) => self.cards[path.index()].crossing,
             End::Controller(node, _) => {
@@ -151,6 +155,13 @@ impl World {
         self.links[link].upstream = upstream;
         self.links[link].transit = self.ports(upstream, downstream, kind) + Span::ns(cable);
         self.round = self.measure_round();
+        self.way_changes(self.horizon);
+    }
+
+    /// A capture probe has made a link longer: all frames walk past it.
+    pub(super) fn probe_changes_round(&mut self) {
+        self.round = self.measure_round();
+        self.fast_path.forbidden = true;
         self.way_changes(self.horizon);
     }
 

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 mod basics;
+mod capture_probe;
+mod check_order;
 mod clocks;
 mod exchange;
 mod faults;

@@ -1,9 +1,11 @@
 //! A capture, from its first frame to its last.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use linesman_diagnosis::Engine;
+use linesman_capture::Survey;
+use linesman_diagnosis::{Engine, FrameSeen};
 use linesman_link::input::Input;
+use linesman_proto::address::Network;
 use linesman_runtime::capture::Capture;
 use linesman_runtime::stop::Stop;
 
@@ -24,52 +26,112 @@ pub(super) fn judge(
     session: &mut DiagnosisRun,
     output: &mut Output,
 ) -> Result<Judged, Failure> {
-    let (path, progress) = (input.name().to_owned(), input.progress());
-    let is_whole_known = progress.share().is_some();
-    let read =
-        || progress.share().map_or_else(String::new, |share| format!("{}, ", percent(share)));
-    let mut capture = Capture::of(input)?;
+    let path = input.name().to_owned();
+    judge_frames(&path, Capture::of(input)?, stop, session, output)
+}
+
+/// Judges the files of one recording as one capture.
+pub(super) fn judge_ring(
+    paths: &[PathBuf],
+    stop: &Stop,
+    session: &mut DiagnosisRun,
+    output: &mut Output,
+) -> Result<Judged, Failure> {
+    let all: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    let label = all.join(" + ");
+    session.setup.source = format!("capture:{label}");
+    judge_frames(Path::new(&label), Capture::of_files(paths)?, stop, session, output)
+}
+
+fn judge_frames(
+    path: &Path,
+    mut capture: Capture,
+    stop: &Stop,
+    session: &mut DiagnosisRun,
+    output: &mut Output,
+) -> Result<Judged, Failure> {
     session.setup.start = capture.start().and_then(|start| start.rfc3339());
     session.setup.clock = "capture".to_owned();
     let mut engine = Engine::new(session.setup.clone());
+    // The page tells what happened by time.
+    let mut survey = session.html.is_some().then(Survey::default);
+    let whole = read(path, &mut capture, stop, output, |frame, output| {
+        match &mut survey {
+            Some(survey) => survey.handle_frame(&mut engine, frame),
+            None => engine.handle_frame(frame),
+        }
+        session.follow(&mut engine, output);
+    });
+    session.setup.start = capture.start().and_then(|start| start.rfc3339());
+    let at = capture.latest();
+    engine.handle_missed(Network::default(), capture.missed(), at);
+    match &mut survey {
+        Some(survey) => survey.finish(&mut engine, at, whole.is_complete),
+        None => engine.finish(at, whole.is_complete),
+    }
+    // Copies of a capture probe are frames once all have come.
+    if engine.diagnosis().network.frames.0 == 0 {
+        return Err(nothing_seen(path, &capture, whole.frames));
+    }
+    session.surveyed = survey.and_then(|survey| survey.report(&engine));
+    session.tell_rest(&mut engine, output);
+    let names = names(&engine);
+    Ok(Judged { engine, names, at })
+}
+
+/// What was read of a capture.
+pub(crate) struct ReadFrames {
+    /// Ethernet frames.
+    pub(crate) frames: u64,
+    /// Whether the file was read to its end, and is whole.
+    pub(crate) is_complete: bool,
+}
+
+/// Hands the frames of a capture to `take`, shows how far it is, and says where it does not get to its end.
+pub(crate) fn read(
+    path: &Path,
+    capture: &mut Capture,
+    stop: &Stop,
+    output: &mut Output,
+    mut take: impl FnMut(&FrameSeen<'_>, &mut Output),
+) -> ReadFrames {
+    let is_whole_known = capture.progress().is_some();
+    let read = |share: Option<f64>| {
+        share.map_or_else(String::new, |share| format!("{}, ", percent(share)))
+    };
     let mut shown = Progress::new();
     let mut frames: u64 = 0;
     let mut is_ended = false;
     while let Some(frame) = capture.next_frame() {
-        engine.handle_frame(&frame);
+        take(&frame, output);
         frames += 1;
+        let at = frame.time.as_nanos();
         if frames.is_multiple_of(FRAMES_BETWEEN_LOOKS) {
-            let at = frame.time.as_nanos();
-            shown.show(|| format!("{}{}, {}", read(), count(frames, "frame"), time(at)));
+            let share = capture.progress();
+            shown.show(|| format!("{}{}, {}", read(share), count(frames, "frame"), time(at)));
         }
-        session.follow(&mut engine, output);
         is_ended = is_whole_known && stop.is_set();
         if output.is_closed() || is_ended {
             break;
         }
     }
     shown.clear();
-    session.setup.start = capture.start().and_then(|start| start.rfc3339());
     let end = capture.end().cloned();
-    let complete = end.as_ref().is_some_and(|end| end.complete());
-    if let Some(end) = end.filter(|end| !end.complete()) {
+    let is_read = end.as_ref().is_some_and(|end| end.complete());
+    let is_complete = is_read && capture.fault().is_none();
+    if let Some(fault) = capture.fault() {
+        output.warn(&format!("{fault}: judged up to there"));
+    } else if let Some(end) = end.filter(|end| !end.complete()) {
         output.warn(&format!("{}: {end}", path.display()));
     } else if is_ended {
-        let (read, frames) = (read(), count(frames, "frame"));
+        let (read, frames) = (read(capture.progress()), count(frames, "frame"));
         output.warn(&format!("{}: ended at {read}{frames}: judged so far", path.display()));
     }
-    let seen = engine.diagnosis().network.frames.0;
-    if seen == 0 {
-        return Err(nothing_seen(&path, &capture, frames));
-    }
-    let at = capture.latest();
-    session.end(&mut engine, at, complete, output);
-    let names = names(&engine);
-    Ok(Judged { engine, names, at })
+    ReadFrames { frames, is_complete }
 }
 
 /// Why a capture without EtherCAT says nothing.
-fn nothing_seen(path: &Path, capture: &Capture, frames: u64) -> Failure {
+pub(crate) fn nothing_seen(path: &Path, capture: &Capture, frames: u64) -> Failure {
     let skipped: Vec<String> = capture
         .skipped()
         .iter()

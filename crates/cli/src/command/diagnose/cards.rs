@@ -25,7 +25,7 @@ const LOOK_EVERY: Span = Span::ms(10);
 pub(super) fn run(
     names: &[String],
     active: bool,
-    session: DiagnosisRun,
+    mut session: DiagnosisRun,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     line_access::refuse(names)?;
@@ -42,6 +42,7 @@ pub(super) fn run(
         ..session.setup.clone()
     };
     let recorder = session.recorder(clock.started_at(), names)?;
+    session.begin_bundles(clock.started_at(), names)?;
     let looking = CardPoll {
         engine: Engine::new(setup),
         session,
@@ -56,7 +57,7 @@ pub(super) fn run(
     let CardPoll { engine, mut session, recorder, frames, mut progress, output, .. } =
         driver.into_hooks();
     progress.clear();
-    session.end_recording(recorder, output);
+    session.end_recording(recorder, clock.now(), output);
     let complete = match result {
         Ok(()) => true,
         Err(error) if frames == 0 => return Err(error.into()),
@@ -98,10 +99,16 @@ impl SessionHooks for CardPoll<'_> {
             recorder.frame(frame);
         }
         self.engine.handle_frame(frame);
+        if let Some(recording) = &mut self.session.recording {
+            recording.frame(frame);
+        }
     }
 
     fn host(&mut self, observation: &HostObservation) {
         self.engine.handle_host(observation);
+        if let Some(recording) = &mut self.session.recording {
+            recording.host(observation);
+        }
     }
 
     fn event(&mut self, now: Instant, event: Event, _: &mut MainDevice) {
@@ -120,6 +127,7 @@ impl SessionHooks for CardPoll<'_> {
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
         self.engine.handle_timeout(now);
         self.session.follow(&mut self.engine, self.output);
+        self.session.turn_bundles(now, &self.engine, self.output);
         self.session.look_at_recording(self.recorder.as_ref(), self.output);
         while let Some(wish) = self.engine.poll_probe() {
             // Mailboxes of SubDevices that nobody drives are not asked: they are of no plan.

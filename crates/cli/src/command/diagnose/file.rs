@@ -1,4 +1,4 @@
-//! A file, a pipe or standard input: a capture, or a text with what was read.
+//! A file, a pipe or standard input: a capture, a bundle, or a text with what was read.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use linesman_link::capture::CaptureError;
 use linesman_link::input::{Content, Input};
 use linesman_runtime::stop::Stop;
 
-use super::{DiagnosisRun, Judged, capture, observations};
+use super::{DiagnosisRun, Judged, bundle, capture, observations};
 use crate::failure::Failure;
 use crate::output::Output;
 
@@ -24,6 +24,7 @@ pub(super) fn judge(
             session.setup.source = format!("capture:{}", path.display());
             capture::judge(input, stop, session, output)
         }
+        Content::Archive => bundle::judge(input, session, output),
         Content::Text => {
             session.setup.source = path.display().to_string();
             observations::judge(input, session)

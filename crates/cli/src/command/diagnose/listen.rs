@@ -29,7 +29,7 @@ const NAP: Span = Span::ms(100);
 pub(super) fn run(
     names: &[String],
     questions: Option<AskSetup>,
-    session: DiagnosisRun,
+    mut session: DiagnosisRun,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
@@ -38,6 +38,7 @@ pub(super) fn run(
     let mut card_listener = CardListener::open(names, clock)?;
     let asking = questions.map(|setup| questions::open(names, clock, setup)).transpose()?;
     let recorder = session.recorder(clock.started_at(), names)?;
+    session.begin_bundles(clock.started_at(), names)?;
     let mut listening =
         Listening { session, clock, recorder, engine: None, asking, frames: 0, is_local: false };
     let mut progress = Progress::new();
@@ -62,7 +63,7 @@ pub(super) fn run(
     progress.clear();
     let heard_for = clock.now();
     let Listening { mut session, engine, recorder, asking, is_local, .. } = listening;
-    session.end_recording(recorder, output);
+    session.end_recording(recorder, heard_for, output);
     let Some(mut engine) = engine else {
         return Err(
             lost.map_or_else(|| silence(names, heard_for, without_link(names)), Failure::from)
@@ -122,6 +123,9 @@ impl Listening {
                         engine.watch_host();
                     }
                     engine.handle_frame(&frame);
+                    if let Some(recording) = &mut session.recording {
+                        recording.frame(&frame);
+                    }
                     if let Some(asking) = asking {
                         asking.frame(&frame);
                     }
@@ -129,11 +133,20 @@ impl Listening {
                 ListenEvent::Host(observation) => {
                     if let Some(engine) = engine {
                         engine.handle_host(&observation);
+                        if let Some(recording) = &mut session.recording {
+                            recording.host(&observation);
+                        }
                     }
                 }
                 ListenEvent::Missed(count, at) => {
+                    if let Some(recorder) = recorder {
+                        recorder.missed(count);
+                    }
                     if let Some(engine) = engine {
                         engine.handle_missed(Network::default(), count, at);
+                        if let Some(recording) = &mut session.recording {
+                            recording.missed(count, at);
+                        }
                     }
                     if let Some(asking) = asking {
                         asking.missed();
@@ -146,8 +159,10 @@ impl Listening {
         })?;
         session.look_at_recording(recorder.as_ref(), output);
         if let Some(engine) = engine {
-            engine.handle_timeout(clock.now());
+            let now = clock.now();
+            engine.handle_timeout(now);
             session.follow(engine, output);
+            session.turn_bundles(now, engine, output);
         }
         Ok(())
     }

@@ -109,7 +109,7 @@ fn judge(
     if stop.is_set() || output.is_closed() {
         return Err(not_looked_at(selector));
     }
-    let mut session = DiagnosisRun::new(arguments, selector, project);
+    let mut session = DiagnosisRun::new(arguments, selector, project, None);
     let judged = file::judge(path, stop, &mut session, output)?;
     Ok((session.diagnosis(&judged.engine), judged.names))
 }

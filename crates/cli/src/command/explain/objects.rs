@@ -3,7 +3,7 @@
 use linesman_proto::mailbox::coe::standard_object::{
     FoundObject, StandardObject, all, area_of, drive_state, lookup, slot_of,
 };
-use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex, SyncTypes};
+use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex, sync_parameters};
 use linesman_proto::register::describe::decode_fields;
 
 use super::page::{Kind, Page};
@@ -103,12 +103,14 @@ pub(super) fn value(index: ObjectIndex, subindex: Option<u8>, value: u64) -> Opt
     let found = lookup(index).into_iter().next()?;
     let object: &StandardObject = found.object;
     let address = ObjectAddress { index, subindex: subindex.unwrap_or(0) };
-    if matches!(index, ObjectIndex::OUTPUT_SYNC | ObjectIndex::INPUT_SYNC)
-        && subindex == Some(SyncTypes::SUBINDEX)
-    {
-        let types = SyncTypes(u16::try_from(value).ok()?);
-        let title = format!("{}, supported types ({address}) = 0x{value:04X}", object.name);
-        return Some(Page::new(Kind::Value, title).text(format!("It says: {types}.")));
+    if let Some(words) = sync_parameters::in_words(address, value).filter(|_| subindex.is_some()) {
+        let entry = object
+            .entries
+            .iter()
+            .find(|entry| (entry.first..=entry.last).contains(&address.subindex));
+        let name = entry.map_or("", |entry| entry.name);
+        let title = format!("{}, {name} ({address}) = 0x{value:04X}", object.name);
+        return Some(Page::new(Kind::Value, title).text(format!("It says: {words}.")));
     }
     let len = object.bytes().filter(|len| *len <= 8 && !object.bits.is_empty())?;
     let digits = 2 * len;

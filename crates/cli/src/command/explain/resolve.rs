@@ -147,7 +147,8 @@ fn letters(text: &str) -> String {
     letters.map(|letter| letter.to_ascii_lowercase()).collect()
 }
 
-/// Adds an entry of an object: `0x1C32:0B`, `1C32.11`, `1018h:01`, `0x1018 sub 1`, `6040/0`.
+/// Adds an entry of an object: `0x1C32:0B`, `1C32.11`, `1018h:01`, `0x1018 sub 1`, `6040/0`; with a value behind it
+/// (`0x1C32:05 0x249F0`) also what that says.
 ///
 /// Behind a colon a subindex is hexadecimal, as ETG writes it; behind a dot people count in decimal.
 fn object_entry(text: &str, likely: u8, found: &mut Found) {
@@ -156,9 +157,9 @@ fn object_entry(text: &str, likely: u8, found: &mut Found) {
     for word in ["coe object ", "object ", "sdo ", "coe ", "index "] {
         text = text.strip_prefix(word).unwrap_or(text);
     }
+    let (text, value) = entry_and_value(text);
     let text = text.replace("subindex", ":").replace(" sub ", ":").replace(' ', "");
-    // A value behind it is read with the object.
-    let text = text.split_once('=').map_or(text.as_str(), |(entry, _)| entry);
+    let text = text.as_str();
     let Some((index, sub)) = text.split_once([':', '.', '/', ',']) else { return };
     let by_dot = text.contains('.') && !text.contains(':');
     let index = number::readings(index).into_iter().find(|number| !number.decimal);
@@ -174,9 +175,27 @@ fn object_entry(text: &str, likely: u8, found: &mut Found) {
         bases.into_iter().filter_map(|base| u8::from_str_radix(digits, base).ok()).collect();
     subindices.truncate(if sub.starts_with("0x") || digits.starts_with('0') { 1 } else { 2 });
     subindices.dedup();
+    let value = value.and_then(|value| number::readings(value).first().copied());
     for (order, subindex) in subindices.into_iter().enumerate() {
         let likelihood = if order == 0 { likely } else { likely.min(60) };
+        let told = value
+            .filter(|_| order == 0)
+            .and_then(|number| objects::value(ObjectIndex(index), Some(subindex), number.value));
+        found.extend(likelihood.saturating_add(2), told);
         found.extend(likelihood, objects::pages(ObjectIndex(index), Some(subindex)));
+    }
+}
+
+/// The entry of a text, and a value behind it.
+fn entry_and_value(text: &str) -> (&str, Option<&str>) {
+    if let Some((entry, value)) = text.split_once('=') {
+        return (entry, Some(value.trim()));
+    }
+    match text.rsplit_once(' ') {
+        Some((entry, value)) if entry.contains([':', '/']) && !entry.ends_with(':') => {
+            (entry, Some(value))
+        }
+        Some(_) | None => (text, None),
     }
 }
 

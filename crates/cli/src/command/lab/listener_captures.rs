@@ -9,6 +9,7 @@ use linesman_lab::score::listen::Heard;
 use linesman_lab::score::{CaseReport, RecordedFrame};
 use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
+use linesman_proto::time::Instant;
 use linesman_runtime::record::Recorder;
 
 use crate::failure::Failure;
@@ -44,7 +45,8 @@ fn record(path: &FilePath, heard: &Heard) -> Result<(), Failure> {
     for (frame, number) in heard.frames.iter().zip(1..) {
         recorder.frame(&seen(frame, number));
     }
-    recorder.finish().map_err(|error| files::in_file(path, &error))
+    let last = heard.frames.last().map_or(Instant::ZERO, |frame| frame.time);
+    recorder.finish(last).map_err(|error| files::in_file(path, &error))
 }
 
 fn seen(frame: &RecordedFrame, number: u64) -> FrameSeen<'_> {
@@ -56,6 +58,7 @@ fn seen(frame: &RecordedFrame, number: u64) -> FrameSeen<'_> {
         number,
         fcs: frame.fcs,
         truncated: false,
+        probe: None,
         bytes: &frame.bytes,
     }
 }

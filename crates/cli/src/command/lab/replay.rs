@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 use linesman_config::esi::Esi;
 use linesman_lab::replay::report::Verdict;
 use linesman_lab::replay::{Model, Recorder, Recording, Report, learn, model, on_segment, play};
+use linesman_link::capture::CaptureError;
+use linesman_link::input::Input;
 use linesman_runtime::capture::Capture;
 use linesman_sim::device::DescribedType;
 use serde::Serialize;
 
+use crate::command::bundle::frames;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -23,8 +26,8 @@ const MAX_IMAGE: u64 = 1024 * 1024;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// The recording: pcap or pcapng, plain or gzipped
-    #[arg(value_name = "CAPTURE.pcapng")]
+    /// The recording: pcap or pcapng, plain or gzipped; or a bundle
+    #[arg(value_name = "CAPTURE.pcapng|BUNDLE.zip")]
     capture: PathBuf,
     /// Play against this segment; without it, one is built of what the recording shows
     #[arg(long, value_name = "SEGMENT.toml")]
@@ -134,7 +137,8 @@ fn conclusion(report: &Report) -> String {
 }
 
 fn record(path: &Path, output: &mut Output) -> Result<Recording, Failure> {
-    let mut capture = Capture::open(path)?;
+    let input = Input::open(path).map_err(CaptureError::from)?;
+    let mut capture = Capture::of(frames(input)?)?;
     let mut recorder = Recorder::default();
     while let Some(frame) = capture.next_frame() {
         recorder.take(&frame);

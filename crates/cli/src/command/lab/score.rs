@@ -1,25 +1,30 @@
 //! `linesman lab score`: how often the diagnosis is right.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use linesman_config::fault::FaultName;
 use linesman_lab::habit::Habit;
-use linesman_lab::score::report::{GroupReport, SideReport};
-use linesman_lab::score::{Perturbation, Rate, ScoreOptions, ScoreReport, Tally, run_case};
+use linesman_lab::score::parts::{self, ScorePart};
+use linesman_lab::score::{CaseReport, Perturbation, ScoreOptions, ScoreReport, Tally, run_case};
+use linesman_proto::time::Span;
 
-use super::{listener_captures, listener_tables, on_all_processors, seeds};
+use super::{listener_captures, merge, on_all_processors, score_tables, seeds};
 use crate::exit::Status;
 use crate::failure::Failure;
-use crate::output::{Output, Progress, Table};
+use crate::output::{Output, Progress};
 use crate::text::quantity::count;
+use crate::{amount, files, version};
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     /// From the first seed up to, not including, the second
-    #[arg(long, value_name = "A..B", value_parser = seeds)]
-    seeds: Range<u64>,
+    #[arg(long, value_name = "A..B", value_parser = seeds, required_unless_present = "fresh")]
+    seeds: Option<Range<u64>>,
+    /// So many seeds that nobody has looked at before: their range follows from the commit of this program
+    #[arg(long, value_name = "COUNT", value_parser = amount::count(1, 1_000_000), conflicts_with = "seeds")]
+    fresh: Option<u64>,
     /// Only this fault, one in each case
     #[arg(long, value_name = "NAME")]
     fault: Option<FaultName>,
@@ -29,8 +34,11 @@ pub(crate) struct Arguments {
     /// Nothing is wrong in any case, but much is done that is no fault: whatever is said is a false alarm
     #[arg(long, conflicts_with_all = ["fault", "perturb"])]
     healthy: bool,
-    /// Make the plants other than the diagnosis expects: delays, rates, forwarded, lost-reads or
-    /// cleared-counters
+    /// With --healthy: let each line run so long, disturbed now and then, such as 2h
+    #[arg(long = "for", value_name = "TIME", value_parser = amount::lasting(), requires = "healthy")]
+    lasts: Option<Span>,
+    /// Make the plants other than the diagnosis expects: delays, rates, forwarded, lost-reads,
+    /// cleared-counters, counting or bursts
     #[arg(long, value_name = "NAME")]
     perturb: Option<Perturbation>,
     /// Let the MainDevice play a habit of others: process-data, states, links, counters, clearing or soem. Then
@@ -42,10 +50,21 @@ pub(crate) struct Arguments {
     /// SEED-after.pcapng, or SEED-late.pcapng of healthy lines, and the project as SEED.toml
     #[arg(long, value_name = "DIRECTORY")]
     record: Option<PathBuf>,
+    /// Write the plant of each case to this new directory, as SEED.toml, and what was said of it, as SEED-live.json and
+    /// SEED-recording.json
+    #[arg(long, value_name = "DIRECTORY")]
+    reports: Option<PathBuf>,
+    /// Write each case to this new file, schema linesman.score-part/1, for `lab merge`
+    #[arg(long, value_name = "FILE.json")]
+    part: Option<PathBuf>,
+    /// Exit with 1 when fewer than so many of 100 single faults have cause and place right, admitted sets counted: when
+    /// even the upper end of the 95 % interval lies below
+    #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(1..=100))]
+    floor: Option<u8>,
     /// Also each case that was judged wrongly, with what was said
     #[arg(long)]
     list: bool,
-    /// JSON, schema linesman.score/1
+    /// JSON, schema linesman.score/2
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -53,29 +72,45 @@ pub(crate) struct Arguments {
 /// Plays the cases on all processors and adds up in the order of seeds: the sum is the same for any
 /// number of them.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
+    let range = range(arguments)?;
     if let Some(directory) = &arguments.record {
         listener_captures::create(directory, arguments.habit)?;
+    }
+    if let Some(path) = &arguments.part {
+        files::refuse_to_overwrite(path)?;
+    }
+    if let Some(directory) = &arguments.reports {
+        std::fs::create_dir(directory).map_err(|error| files::in_file(directory, &error))?;
     }
     let mut written = Ok(());
     let options = ScoreOptions {
         fault: arguments.fault,
         capture_only: arguments.capture_only,
         healthy: arguments.healthy,
+        healthy_for: arguments.lasts.unwrap_or(Span::ZERO),
         perturb: arguments.perturb,
         habit: arguments.habit,
         keeps_heard: arguments.record.is_some(),
+        keeps_reports: arguments.reports.is_some(),
     };
     let mut tally = Tally::new(options);
+    let mut cases = Vec::new();
     let mut progress = Progress::new();
-    let total = arguments.seeds.end - arguments.seeds.start;
+    let total = range.end - range.start;
     let mut done = 0;
     on_all_processors(
-        arguments.seeds.clone(),
+        range.clone(),
         |seed| run_case(seed, &options),
         |case| {
             tally.add(&case);
             if let (Some(directory), Ok(())) = (&arguments.record, &written) {
                 written = listener_captures::write(directory, &case);
+            }
+            if let (Some(directory), Ok(())) = (&arguments.reports, &written) {
+                written = write_reports(directory, &case);
+            }
+            if arguments.part.is_some() {
+                cases.push(case);
             }
             done += 1;
             progress.show(|| format!("{done} of {}", count(total, "seed")));
@@ -83,193 +118,74 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     );
     progress.clear();
     written?;
-    let report = tally.report();
-    if arguments.json {
-        output.json(&report);
-    } else {
-        show(&report, arguments.list, output);
+    if let Some(path) = &arguments.part {
+        let seeds = (range.start, range.end);
+        let (schema, tool) = (parts::SCHEMA.to_owned(), version::tool());
+        // What else is written of a part changes nothing in its cases.
+        let options = ScoreOptions { keeps_heard: false, keeps_reports: false, ..options };
+        let part = ScorePart { schema, tool, seeds, options, cases };
+        files::write_new(path, "the part of the score", &merge::text_of(path, &part)?)?;
     }
-    let is_judged = report.effective_cases + report.healthy_runs > 0;
-    Ok(if is_judged { Status::Good } else { Status::NotJudged })
+    Ok(show(&tally.report(), arguments.json, arguments.list, arguments.floor, output))
 }
 
-fn show(report: &ScoreReport, list: bool, output: &mut Output) {
-    let (from, to) = report.seeds;
-    output.line(&format!(
-        "Seeds {from}..{to}: {}, in {} a fault had an effect{}{}.",
-        count(report.cases, "case"),
-        report.effective_cases,
-        report.perturbed.as_ref().map_or_else(String::new, |name| format!("; perturbed: {name}")),
-        report.listened.as_ref().map_or_else(String::new, |_| format!("; habit: {}", report.habit)),
-    ));
-    if let Some(report) = &report.listened {
-        output.line("");
-        listener_tables::show(report, list, output);
-    }
-    output.line("");
-    let mut table = Table::new(
-        &["single faults", "place", "cause", "place, set", "cause, set", "95 %"],
-        output.paint(),
-    );
-    for (name, side) in
-        [("live", report.single.live.as_ref()), ("recording", Some(&report.single.capture))]
-    {
-        let Some(side) = side else { continue };
-        table.row([
-            name.to_owned(),
-            share(side.place_at_1),
-            share(side.cause_at_1),
-            share(side.place_at_1_set),
-            share(side.cause_at_1_set),
-            format!("{} / {}", interval(side.place_at_1_set), interval(side.cause_at_1_set)),
-        ]);
-    }
-    table.row([
-        "first counter above zero".to_owned(),
-        share(report.single.baseline),
-        "-".to_owned(),
-        "-".to_owned(),
-        "-".to_owned(),
-        interval(report.single.baseline),
-    ]);
-    table.row(["no diagnosis", "0.0 %", "-", "-", "-", "-"].map(str::to_owned));
-    output.text(&table.render());
-    output.line("");
-    let (healthy, capture) = (report.healthy.silent, report.healthy.silent_capture);
-    output.line(&format!(
-        "Nothing wrong: {}, {} false alarms ({} in the recordings).",
-        count(healthy.of, "run"),
-        healthy.of - healthy.right,
-        capture.of - capture.right
-    ));
-    let double = &report.double;
-    output.line(&format!(
-        "Two faults: {}; both places {} {}, both causes {}; in the recordings {} and {}.",
-        count(double.both_places.of.max(double.both_places_capture.of), "case"),
-        share(double.both_places),
-        interval(double.both_places),
-        share(double.both_causes),
-        share(double.both_places_capture),
-        share(double.both_causes_capture)
-    ));
-    output.line("");
-    groups(report, output);
-    output.line("");
-    output.line("How sure, and how often cause and place were just that:");
-    for bin in &report.calibration {
-        let right = bin.right;
-        output.line(&format!(
-            "  {:>3.0} %   {} of {}",
-            bin.confidence * 100.0,
-            share(right),
-            count(right.of, "finding")
-        ));
-    }
-    output.line(&format!(
-        "  calibration error {:.1} % (how far the two are apart, on average)",
-        report.calibration_error * 100.0
-    ));
-    if !report.named_in_100_ms.is_empty() {
-        let fast = report.named_in_100_ms.iter();
-        let fast = fast.map(|(name, rate)| format!("{name} {} of {}", rate.right, rate.of));
-        let fast: Vec<String> = fast.collect();
-        output.line("");
-        output.line(&format!(
-            "Named within 100 ms of virtual time, at a cycle of 1 ms: {}.",
-            fast.join(", ")
-        ));
-    }
-    for alarm in &report.healthy.alarms {
-        output.line(&format!("false alarm, {alarm}"));
-    }
-    for why in &report.unplayable {
-        output.line(&format!("not played, {why}"));
-    }
-    if !list {
-        return;
-    }
-    for wrong in &report.wrong {
-        let ring = if wrong.ring { ", ring" } else { "" };
-        output.line(&format!(
-            "seed {}: {} ({}, {}{ring})",
-            wrong.seed,
-            wrong.fault,
-            count(wrong.effects, "effect"),
-            count(wrong.devices, "SubDevice")
-        ));
-        if let Some(live) = &wrong.live {
-            output.line(&format!("    live       {live}"));
-        }
-        output.line(&format!("    recording  {}", wrong.capture));
-        if wrong.findings.len() > 1 {
-            output.line(&format!("    in all     {}", wrong.findings.join("; ")));
-        }
-    }
-}
-
-fn groups(report: &ScoreReport, output: &mut Output) {
-    let mut table = Table::new(
-        &[
-            "",
-            "faults",
-            "place",
-            "cause",
-            "place, set",
-            "cause, set",
-            "recording",
-            "others",
-            "cycles",
-        ],
-        output.paint(),
-    );
-    let mut add = |name: &str, group: &GroupReport| {
-        if group.faults == 0 {
-            return;
-        }
-        let side = group.live.as_ref().unwrap_or(&group.capture);
-        let recording = &group.capture;
-        table.row([
-            name.to_owned(),
-            group.faults.to_string(),
-            share(side.place_at_1),
-            share(side.cause_at_1),
-            share(side.place_at_1_set),
-            share(side.cause_at_1_set),
-            format!("{} / {}", share(recording.place_at_1_set), share(recording.cause_at_1_set)),
-            side.other_findings.to_string(),
-            cycles(side),
-        ]);
+/// The seeds that are asked for.
+fn range(arguments: &Arguments) -> Result<Range<u64>, Failure> {
+    let Some(number) = arguments.fresh else {
+        return Ok(arguments.seeds.clone().unwrap_or_default());
     };
-    for (name, group) in &report.per_fault {
-        add(name, group);
+    let first = version::first_fresh_seed().ok_or_else(|| {
+        Failure::new(
+            "--fresh: this program was built outside of a clone and has no commit to draw seeds from",
+            "give a range, such as `--seeds 70001..70201`",
+        )
+    })?;
+    Ok(first..first + number)
+}
+
+/// Writes the plant of a case and what was said of it, where it was played to its end.
+fn write_reports(directory: &Path, case: &CaseReport) -> Result<(), Failure> {
+    let (Some(plant), Some(reports)) = (&case.plant, &case.reports) else { return Ok(()) };
+    let path = directory.join(format!("{}.toml", case.seed));
+    files::write_new(&path, "the plant", &plant.to_toml())?;
+    for (name, report) in ["live", "recording"].into_iter().zip(reports.iter()) {
+        let path = directory.join(format!("{}-{name}.json", case.seed));
+        let text =
+            serde_json::to_string_pretty(report).map_err(|error| files::in_file(&path, &error))?;
+        files::write_new(&path, "a diagnosis", &text)?;
     }
-    for bucket in &report.by_effects {
-        let name = match bucket.to {
-            Some(to) if to == bucket.from => format!("{to} effect"),
-            Some(to) => format!("{} to {to} effects", bucket.from),
-            None => format!("from {} effects", bucket.from),
-        };
-        add(&name, &bucket.group);
+    Ok(())
+}
+
+/// Shows a score; the status says whether it reaches its floor.
+pub(super) fn show(
+    report: &ScoreReport,
+    json: bool,
+    list: bool,
+    floor: Option<u8>,
+    output: &mut Output,
+) -> Status {
+    if json {
+        output.json(report);
+    } else {
+        score_tables::show(report, list, output);
     }
-    add("among old counters", &report.masked);
-    add("without forwarded counters", &report.without_forwarded);
-    add("without the card's counters", &report.without_card_counters);
-    add("in rings", &report.rings);
-    add("each of two", &report.double.faults);
-    output.text(&table.render());
-}
-
-fn share(rate: Rate) -> String {
-    if rate.of == 0 { "-".to_owned() } else { format!("{:.1} %", rate.share * 100.0) }
-}
-
-fn interval(rate: Rate) -> String {
-    format!("[{:.1}, {:.1}]", rate.low * 100.0, rate.high * 100.0)
-}
-
-fn cycles(side: &SideReport) -> String {
-    match (side.cycles_median, side.cycles_95) {
-        (Some(median), Some(late)) => format!("{median} ({late})"),
-        (_, _) => "-".to_owned(),
+    if report.effective_cases + report.healthy_runs == 0 {
+        return Status::NotJudged;
+    }
+    let single = report.single.live.as_ref().unwrap_or(&report.single.capture).cause_at_1_set;
+    // Without any it is not known that it reaches the floor.
+    let at_most = if single.of == 0 { 0.0 } else { single.high * 100.0 };
+    match floor {
+        Some(floor) if at_most < f64::from(floor) => {
+            output.warn(&format!(
+                "cause and place are right in {:.1} % of {} single faults, at most in {at_most:.1} % (95 %), \
+                 expected at least {floor} %",
+                single.share * 100.0,
+                single.of
+            ));
+            Status::Findings
+        }
+        Some(_) | None => Status::Good,
     }
 }

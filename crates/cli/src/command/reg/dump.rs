@@ -55,7 +55,7 @@ pub(super) fn text(words: &[Word], output: &Output) -> String {
 mod tests {
     use super::*;
 
-    // proves: ESC-15 partial: the columns
+    // proves: ESC-15
     #[test]
     fn the_words_of_the_sources_come_out_in_all_columns() {
         let rows = [

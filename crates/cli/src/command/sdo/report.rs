@@ -1,7 +1,7 @@
 //! Objects as JSON and as text.
 
 use linesman_proto::mailbox::coe::information::{Access, ObjectCode};
-use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex, SyncTypes};
+use linesman_proto::mailbox::coe::{DataType, ObjectAddress, ObjectIndex, sync_parameters};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -68,8 +68,8 @@ impl ObjectReport {
         let told = entry.as_ref().map(|entry| entry.data_type);
         let data_type = data_type.or(told.filter(|told| told.name().is_some()));
         let (text, value) = show(data, data_type);
-        let text = match sync_types(object, data) {
-            Some(types) => format!("{text}: {types}"),
+        let text = match sync_parameters::in_words(object, number(data)) {
+            Some(words) => format!("{text}: {words}"),
             None => text,
         };
         Self {
@@ -106,12 +106,9 @@ impl ObjectReport {
     }
 }
 
-/// What a SubDevice can keep step with, where that was read.
-fn sync_types(object: ObjectAddress, data: &[u8]) -> Option<SyncTypes> {
-    let index = matches!(object.index, ObjectIndex::OUTPUT_SYNC | ObjectIndex::INPUT_SYNC);
-    let data: &[u8; 2] = data.try_into().ok()?;
-    let is_it = index && object.subindex == SyncTypes::SUBINDEX;
-    is_it.then_some(SyncTypes(u16::from_le_bytes(*data)))
+/// The bytes of an entry as a number, of those that are longer the first eight.
+fn number(data: &[u8]) -> u64 {
+    data.iter().take(8).rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
 }
 
 impl ReadReport {

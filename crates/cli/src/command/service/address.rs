@@ -48,6 +48,22 @@ pub(crate) fn find(
     place: &str,
     word: &str,
 ) -> Result<DeviceId, Failure> {
+    match find_all(devices, place, word)?[..] {
+        [one] => Ok(one),
+        ref found => {
+            let numbers: Vec<String> = found.iter().map(|id| id.no().to_string()).collect();
+            let reason = format!("{place}: `{word}` may be any of {}", numbers.join(", "));
+            Err(Failure::new(reason, "name it by its number"))
+        }
+    }
+}
+
+/// All SubDevices that a word means, at least one: a type may be that of several.
+pub(crate) fn find_all(
+    devices: &[DeviceNames<'_>],
+    place: &str,
+    word: &str,
+) -> Result<Vec<DeviceId>, Failure> {
     let is = |condition: &dyn Fn(&DeviceNames<'_>) -> bool| -> Vec<DeviceId> {
         devices.iter().filter(|one| condition(one)).map(|one| one.id).collect()
     };
@@ -74,7 +90,7 @@ pub(crate) fn find(
         called(devices, bare)
     };
     match found[..] {
-        [one] => Ok(one),
+        [_, ..] => Ok(found),
         [] => {
             let named = devices.iter().take(MOST_NAMED).map(DeviceNames::label).collect::<Vec<_>>();
             let more = devices.len().saturating_sub(MOST_NAMED);
@@ -87,11 +103,6 @@ pub(crate) fn find(
                 named.join(", ")
             );
             Err(Failure::new(reason, advice))
-        }
-        [..] => {
-            let numbers: Vec<String> = found.iter().map(|id| id.no().to_string()).collect();
-            let reason = format!("{place}: `{word}` may be any of {}", numbers.join(", "));
-            Err(Failure::new(reason, "name it by its number"))
         }
     }
 }

@@ -1,18 +1,14 @@
 //! Service client of a line on real cards: listen first, scan, then serve.
 
-use std::collections::VecDeque;
-
 use linesman_config::inventory::Inventory;
-use linesman_diagnosis::{Diagnosis, Engine, FrameSeen, HostObservation, InputKind, Setup};
+use linesman_diagnosis::{Diagnosis, InputKind, Setup};
 use linesman_link::clock::HostClock;
-use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
-use linesman_maindevice::{Event, MainDevice};
+use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
-use linesman_proto::time::{Instant, Span};
-use linesman_runtime::drive::Driver;
+use linesman_proto::time::Span;
+use linesman_runtime::service_session::{ServiceSession, service_plan};
 use linesman_runtime::stop::Stop;
 use linesman_runtime::transport::Cards;
-use linesman_session::SessionHooks;
 
 use super::{ServiceClient, ServiceRefused};
 use crate::command::line_access;
@@ -25,7 +21,7 @@ const SERVICE_PATIENCE: Span = Span::s(24 * 3_600);
 
 /// A line on cards.
 pub(super) struct CardClient {
-    driver: Driver<Cards, PendingCommand>,
+    session: ServiceSession<Cards>,
     stop: Stop,
     name: String,
 }
@@ -42,34 +38,22 @@ pub(super) fn open(names: &[String]) -> Result<(CardClient, Inventory), Failure>
         clock: "host, monotonic".to_owned(),
         ..Setup::default()
     };
-    let driver = Driver::open(names, clock, PendingCommand::new(Engine::new(setup)))?;
-    let mut cards = CardClient { driver, stop, name: names.join("+") };
-    cards.pending().order = Some(ClientOrder::Scan);
-    cards.run(SCAN_PATIENCE)?;
-    let inventory = match cards.pending().scanned.take() {
+    let session = ServiceSession::new(Cards::open(names, clock)?, Some(setup));
+    let mut cards = CardClient { session, stop, name: names.join("+") };
+    let inventory = match cards.session.scan(SCAN_PATIENCE, &cards.stop)? {
         Some(Ok(inventory)) => inventory,
-        Some(Err(failure)) => {
+        Some(Err(error)) => {
+            let failure = line_access::nobody(&error);
             let reason = format!("{}: {}", cards.name, failure.reason);
             return Err(Failure { reason, ..failure });
         }
         None => return Err(cards.interrupted()),
     };
-    cards.pending().order = Some(ClientOrder::Attend(Box::new(super::plan(&inventory))));
+    cards.session.serve_only(service_plan(&inventory));
     Ok((cards, inventory))
 }
 
 impl CardClient {
-    fn pending(&mut self) -> &mut PendingCommand {
-        self.driver.session_mut().hooks_mut()
-    }
-
-    fn run(&mut self, patience: Span) -> Result<(), Failure> {
-        let until = self.driver.clock().now() + patience;
-        self.pending().done = false;
-        self.driver.run(until, &self.stop)?;
-        Ok(())
-    }
-
     fn interrupted(&self) -> Failure {
         let reason = format!("{}: the command was ended before it was done", self.name);
         Failure::new(reason, "look at the SubDevice's state, then repeat the command")
@@ -82,100 +66,21 @@ impl ServiceClient for CardClient {
         id: DeviceId,
         service: Service,
     ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
-        self.pending().service = Some((id, service));
-        self.run(SERVICE_PATIENCE)?;
-        let served = self.pending().served.take().ok_or_else(|| self.interrupted())?;
+        let served = self.session.ask(id, service, SERVICE_PATIENCE, &self.stop)?;
+        let served = served.ok_or_else(|| self.interrupted())?;
         Ok(served.map_err(|failure| ServiceRefused::from(&failure)))
     }
 
     fn wait(&mut self, span: Span) -> Result<bool, Failure> {
-        self.run(span)?;
+        self.session.wait(span, &self.stop)?;
         Ok(!self.stop.is_set())
     }
 
     fn diagnosis(&mut self) -> Option<Diagnosis> {
-        let now = self.driver.clock().now();
-        let engine = &mut self.pending().engine;
-        engine.finish(now, true);
-        Some(engine.diagnosis())
+        self.session.diagnosis()
     }
 
     fn take_emergencies(&mut self) -> Vec<(DeviceId, String)> {
-        self.pending().emergencies.drain(..).collect()
-    }
-}
-
-enum ClientOrder {
-    Scan,
-    Attend(Box<linesman_config::plan::Plan>),
-}
-
-/// Gives one command at a time and waits for its end.
-struct PendingCommand {
-    /// Judges all frames.
-    engine: Engine,
-    order: Option<ClientOrder>,
-    service: Option<(DeviceId, Service)>,
-    ticket: Option<ServiceTicket>,
-    done: bool,
-    scanned: Option<Result<Inventory, Failure>>,
-    served: Option<Result<ServiceAnswer, ServiceFailure>>,
-    emergencies: VecDeque<(DeviceId, String)>,
-}
-
-impl PendingCommand {
-    fn new(engine: Engine) -> Self {
-        Self {
-            engine,
-            order: None,
-            service: None,
-            ticket: None,
-            done: false,
-            scanned: None,
-            served: None,
-            emergencies: VecDeque::new(),
-        }
-    }
-}
-
-impl SessionHooks for PendingCommand {
-    fn frame(&mut self, frame: &FrameSeen<'_>) {
-        self.engine.handle_frame(frame);
-    }
-
-    fn host(&mut self, observation: &HostObservation) {
-        self.engine.handle_host(observation);
-    }
-
-    fn event(&mut self, _: Instant, event: Event, _: &mut MainDevice) {
-        if let Event::Scanned(inventory) = event {
-            (self.scanned, self.done) = (Some(Ok(*inventory)), true);
-        } else if let Event::ScanFailed(error) = event {
-            (self.scanned, self.done) = (Some(Err(line_access::nobody(&error))), true);
-        } else if let Event::Emergency { id, emergency } = event {
-            self.emergencies.push_back((id, emergency.to_string()));
-        } else if let Event::Served { ticket, result, .. } = event
-            && self.ticket == Some(ticket)
-        {
-            (self.served, self.done) = (Some(*result), true);
-        }
-    }
-
-    fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
-        self.engine.handle_timeout(now);
-        match self.order.take() {
-            // It looks, with nothing but reads, before it writes.
-            Some(ClientOrder::Scan) => main.scan(now),
-            Some(ClientOrder::Attend(plan)) => main.attend(now, *plan),
-            None => {}
-        }
-        if let Some((id, service)) = self.service.take() {
-            self.ticket = Some(main.serve(now, id, service));
-        }
-        !self.done
-    }
-
-    fn poll_timeout(&self) -> Option<Instant> {
-        self.engine.poll_timeout()
+        self.session.take_emergencies()
     }
 }

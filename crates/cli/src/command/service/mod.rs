@@ -1,6 +1,6 @@
 //! Common part of the commands for single SubDevices: a line that is served without being driven.
 
-mod address;
+pub(crate) mod address;
 mod cards;
 mod known;
 mod mailbox;
@@ -8,12 +8,10 @@ mod refusal;
 mod segment;
 mod socket;
 
-use linesman_config::inventory::{FoundDevice, Inventory, label};
-use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
+use linesman_config::inventory::{Inventory, label};
 use linesman_diagnosis::Diagnosis;
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer, ServiceFailure};
 use linesman_proto::address::{DeviceId, RegisterAddress};
-use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::selector::Selector;
 use serde::Serialize;
@@ -299,26 +297,6 @@ impl ServiceLine {
     pub(crate) fn emergencies(&mut self) -> Vec<String> {
         let all = self.client.take_emergencies();
         all.into_iter().map(|(id, text)| format!("{}: {text}", self.label(id))).collect()
-    }
-}
-
-/// What the SubDevices of an inventory are served by: their plans, each to stay where it is.
-fn plan(inventory: &Inventory) -> Plan {
-    let planned = inventory.planned(AlState::Op);
-    let tree = inventory.tree().clone();
-    match Plan::build(&planned, tree.clone(), &PlanOptions::default()) {
-        Ok(plan) => plan,
-        // A line that cannot exchange process data can be served all the same.
-        Err(_) => {
-            let device = |found: &FoundDevice| DevicePlan {
-                name: found.label(),
-                station: found.station,
-                mailbox: found.profile.mailbox,
-                device_emulation: found.profile.device_emulation,
-                ..DevicePlan::bare(found.id)
-            };
-            Plan { devices: inventory.devices.iter().map(device).collect(), ..Plan::empty(tree) }
-        }
     }
 }
 

@@ -10,6 +10,7 @@ use linesman_maindevice::Event;
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Span;
+use linesman_runtime::service_session::service_plan;
 use linesman_sim::segment_file::SegmentFile;
 
 use super::{ServiceClient, ServiceRefused};
@@ -87,7 +88,7 @@ fn serve(
     })?;
     let inventory = scanned?;
     let now = segment.lab.now();
-    segment.lab.main_mut().attend(now, super::plan(&inventory));
+    segment.lab.main_mut().serve_only(now, service_plan(&inventory));
     let names = names(&segment.lab, &inventory);
     Ok((segment, inventory, names))
 }

@@ -362,10 +362,10 @@ fn ours(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
         ("emulation", u8::from(device.device_emulation).to_string()),
         ("target", device.target.to_string()),
         ("frame-repeat", u8::from(settings.frame_repeat).to_string()),
-        ("revision-rule", Word(&device.revision_rule).to_string()),
-        ("access", Word(&settings.access).to_string()),
-        ("addressing", Word(&settings.addressing).to_string()),
-        ("on-wrong-counter", Word(&settings.on_wrong_counter).to_string()),
+        ("revision-rule", ChoiceWord(&device.revision_rule).to_string()),
+        ("access", ChoiceWord(&settings.access).to_string()),
+        ("addressing", ChoiceWord(&settings.addressing).to_string()),
+        ("on-wrong-counter", ChoiceWord(&settings.on_wrong_counter).to_string()),
         ("restore-state", u8::from(settings.keeping.restore_state).to_string()),
         ("reinitialise", u8::from(settings.keeping.reinitialise).to_string()),
         ("clear-counters", u8::from(settings.keeping.clear_counters).to_string()),
@@ -396,9 +396,9 @@ fn ours(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
 }
 
 /// The word that stands for a choice in files.
-struct Word<'a, T>(&'a T);
+struct ChoiceWord<'a, T>(&'a T);
 
-impl<T: serde::Serialize> std::fmt::Display for Word<'_, T> {
+impl<T: serde::Serialize> std::fmt::Display for ChoiceWord<'_, T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         self.0.serialize(f)
     }

@@ -14,13 +14,13 @@ use crate::profile::ProcessSyncManager;
 const BIT_WRITES: Range<u16> = 0x0F00..0x0F04;
 
 /// A stretch of a controller's memory that one FMMU maps.
-struct Area {
+struct MappedArea {
     start: RegisterAddress,
     len: u16,
     bits: u32,
 }
 
-impl Area {
+impl MappedArea {
     /// Whether it may share a byte with others.
     fn packs(&self, direction: Direction) -> bool {
         let writable = direction == Direction::Inputs || BIT_WRITES.contains(&self.start.0);
@@ -30,8 +30,8 @@ impl Area {
 
 /// The process data of one direction, SyncManagers that lie side by side joined: a terminal with
 /// two one-byte SyncManagers in a row needs one FMMU only, and may have no more.
-fn areas(managers: &[ProcessSyncManager], direction: Direction) -> Vec<Area> {
-    let mut areas: Vec<Area> = Vec::new();
+fn areas(managers: &[ProcessSyncManager], direction: Direction) -> Vec<MappedArea> {
+    let mut areas: Vec<MappedArea> = Vec::new();
     let mine = managers.iter().filter(|manager| manager.direction == direction && manager.len > 0);
     for manager in mine {
         match areas.last_mut() {
@@ -42,7 +42,7 @@ fn areas(managers: &[ProcessSyncManager], direction: Direction) -> Vec<Area> {
             }
             Some(_) | None => {
                 let (start, len, bits) = (manager.start, manager.len, manager.used_bits());
-                areas.push(Area { start, len, bits });
+                areas.push(MappedArea { start, len, bits });
             }
         }
     }

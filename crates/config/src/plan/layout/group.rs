@@ -20,7 +20,7 @@ pub(super) struct Group {
 
 /// What a SubDevice takes part in.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Kind {
+enum ExchangeKind {
     /// Outputs and inputs in one LRW, or in LWR and LRD side by side.
     Both {
         lrw: bool,
@@ -53,13 +53,13 @@ pub(super) fn groups(
                 ProcessAccess::Separate => false,
             };
         match options.grouping {
-            Grouping::Compact => filling.put(Kind::Both { lrw }, member, (outputs, inputs)),
+            Grouping::Compact => filling.put(ExchangeKind::Both { lrw }, member, (outputs, inputs)),
             Grouping::ByKind if lrw && outputs > 0 && inputs > 0 => {
-                filling.put(Kind::Both { lrw }, member, (outputs, inputs));
+                filling.put(ExchangeKind::Both { lrw }, member, (outputs, inputs));
             }
             Grouping::ByKind => {
-                filling.put(Kind::Outputs, member, (outputs, 0));
-                filling.put(Kind::Inputs, member, (0, inputs));
+                filling.put(ExchangeKind::Outputs, member, (outputs, 0));
+                filling.put(ExchangeKind::Inputs, member, (0, inputs));
             }
         }
     }
@@ -69,11 +69,11 @@ pub(super) fn groups(
 /// Groups as they are being filled; one of each kind is open.
 #[derive(Default)]
 struct Filling {
-    groups: Vec<(Kind, Group)>,
+    groups: Vec<(ExchangeKind, Group)>,
 }
 
 impl Filling {
-    fn put(&mut self, kind: Kind, member: usize, (outputs, inputs): (usize, usize)) {
+    fn put(&mut self, kind: ExchangeKind, member: usize, (outputs, inputs): (usize, usize)) {
         let len = outputs + inputs;
         if len == 0 {
             return;
@@ -82,7 +82,7 @@ impl Filling {
         let open = open.filter(|at| self.groups[*at].1.len + len <= MAX_DATAGRAM_DATA);
         let at = open.unwrap_or(self.groups.len());
         if open.is_none() {
-            let lrw = kind == Kind::Both { lrw: true };
+            let lrw = kind == ExchangeKind::Both { lrw: true };
             self.groups.push((kind, Group { lrw, ..Group::default() }));
         }
         let group = &mut self.groups[at].1;
@@ -99,10 +99,10 @@ impl Filling {
     fn finish(mut self, grouping: Grouping, inputs_first: bool) -> Vec<Group> {
         if grouping == Grouping::ByKind {
             self.groups.sort_by_key(|(kind, _)| match kind {
-                Kind::Both { .. } => 1,
-                Kind::Outputs => 2,
-                Kind::Inputs if inputs_first => 0,
-                Kind::Inputs => 3,
+                ExchangeKind::Both { .. } => 1,
+                ExchangeKind::Outputs => 2,
+                ExchangeKind::Inputs if inputs_first => 0,
+                ExchangeKind::Inputs => 3,
             });
         }
         self.groups.into_iter().map(|(_, group)| group).collect()

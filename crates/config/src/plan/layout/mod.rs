@@ -86,17 +86,9 @@ impl Default for PlanOptions {
 
 /// Which SubDevices share datagrams.
 #[derive(
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Debug,
-    Default,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
+    Clone, Copy, PartialEq, Eq, Hash, Debug, Default, serde::Serialize, serde::Deserialize,
 )]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Grouping {
     /// All that fit: the fewest datagrams.
@@ -206,7 +198,7 @@ impl Plan {
         let mut extra = extra::head(&mut plan, devices, options);
         let last = tasks.len() - 1;
         for (index, (task, members)) in tasks.iter().zip(members).enumerate() {
-            let mut layout = Layout::new(index, task, options);
+            let mut layout = TaskLayout::new(index, task, options);
             let mut datagrams = std::mem::take(&mut extra);
             for unit in units(devices, &members) {
                 layout.place_unit(unit, devices, &mut plan, &mut datagrams)?;
@@ -300,7 +292,7 @@ fn units<'a>(devices: &'a [PlannedDevice], members: &[usize]) -> Vec<(&'a str, V
 }
 
 /// The logical space of a task as it is being filled.
-struct Layout<'a> {
+struct TaskLayout<'a> {
     task: &'a TaskOptions,
     options: &'a PlanOptions,
     next: LogicalAddress,
@@ -308,7 +300,7 @@ struct Layout<'a> {
     units: Vec<SyncUnit>,
 }
 
-impl<'a> Layout<'a> {
+impl<'a> TaskLayout<'a> {
     fn new(index: usize, task: &'a TaskOptions, options: &'a PlanOptions) -> Self {
         // The ninth task's space is that of the mailbox bits.
         let mailboxes = (MAILBOX_STATES.0 / TASK_SPACE) as usize - 1;

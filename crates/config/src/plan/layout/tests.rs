@@ -80,7 +80,7 @@ fn neighbouring_byte_buffers_share_an_fmmu() {
     assert_eq!(plan.devices[0].sync_managers.len(), 2);
 }
 
-// proves: FRM-26 partial
+// proves: FRM-26
 #[test]
 fn a_device_without_lrw_gets_lwr_and_lrd() {
     let both = || {

@@ -30,33 +30,49 @@ const EVERYWHERE: [std::ops::Range<u16>; 17] = [
     0x0500..0x0510,
 ];
 
+/// Whether every controller has the register at this address.
+#[must_use]
+pub(crate) fn is_register_everywhere(ado: RegisterAddress) -> bool {
+    EVERYWHERE.iter().any(|range| range.contains(&ado.0))
+}
+
 /// One datagram on its way back, with all there is to know of it.
-pub(super) struct Answer<'a> {
-    pub(super) command: Command,
-    pub(super) effect: Effect,
-    pub(super) request: Option<Datagram<'a>>,
-    pub(super) reply: Datagram<'a>,
-    pub(super) ado: RegisterAddress,
+#[derive(Clone, Copy, Debug)]
+pub struct Answer<'a> {
+    /// Its command.
+    pub command: Command,
+    /// What that does.
+    pub effect: Effect,
+    /// As it went out; `None` where that was not seen.
+    pub request: Option<Datagram<'a>>,
+    /// As it came back.
+    pub reply: Datagram<'a>,
+    /// The register or memory address.
+    pub ado: RegisterAddress,
     /// Its working counter, all copies so far together.
-    pub(super) sum: u16,
+    pub sum: u16,
     /// The working counter of this copy alone.
-    pub(super) own: u16,
-    pub(super) is_last: bool,
+    pub own: u16,
+    /// Whether no other copy of it will come.
+    pub is_last: bool,
     /// Whether positions can be counted: there is but one copy.
-    pub(super) is_single: bool,
+    pub is_single: bool,
     /// The card by which this copy had gone out, where that is known.
-    pub(super) sent_by: Option<Path>,
+    pub sent_by: Option<Path>,
     /// Whether cards are told apart by more than their addresses.
-    pub(super) knows_cards: bool,
+    pub knows_cards: bool,
     /// When the request went out, where it was seen.
-    pub(super) sent_at: Option<Instant>,
-    pub(super) at: Instant,
-    pub(super) frame: u64,
+    pub sent_at: Option<Instant>,
+    /// When it came back.
+    pub at: Instant,
+    /// The number of the frame in which it came back.
+    pub frame: u64,
 }
 
 impl Answer<'_> {
     /// What was written: as it went out if that was seen, since a read may have changed it.
-    pub(super) fn written(&self) -> &[u8] {
+    #[must_use]
+    pub fn written(&self) -> &[u8] {
         match (self.request, self.effect.reads) {
             (Some(request), _) => request.data(),
             (None, false) => self.reply.data(),
@@ -65,18 +81,21 @@ impl Answer<'_> {
     }
 
     /// Whether it begins at a register that every controller has.
-    pub(super) fn is_everywhere(&self) -> bool {
-        EVERYWHERE.iter().any(|range| range.contains(&self.ado.0))
+    #[must_use]
+    pub fn is_everywhere(&self) -> bool {
+        is_register_everywhere(self.ado)
     }
 
     /// The event bits that controllers set in it, where its request was seen; it may go out with some.
-    pub(super) fn added_events(&self) -> Option<u16> {
+    #[must_use]
+    pub fn added_events(&self) -> Option<u16> {
         let request = self.request.filter(|_| self.is_single && self.own > 0)?;
         Some(self.reply.irq() & !request.irq())
     }
 
     /// How many controllers it passed.
-    pub(super) fn passed(&self) -> Option<u16> {
+    #[must_use]
+    pub fn passed(&self) -> Option<u16> {
         if !self.is_single || !self.command.increments_position() {
             return None;
         }
@@ -89,7 +108,7 @@ impl Answer<'_> {
 }
 
 /// The datagrams of a frame that came back, one by one; `None` for one whose command is not known.
-pub(super) fn answers<'a>(
+pub fn answers<'a>(
     exchange: &'a Exchange<'_>,
     request: Option<&FrameCopy<'a>>,
     reply: &FrameCopy<'a>,

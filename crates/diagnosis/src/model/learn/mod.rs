@@ -18,7 +18,8 @@ use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::FrameView;
 
 pub use address::Addresses;
-use answer::{Answer, answers};
+pub(crate) use answer::is_register_everywhere;
+pub use answer::{Answer, answers};
 use count::CountDoubt;
 
 use super::{Cyclic, Device, NetworkModel, Seen, SharedBy};
@@ -339,6 +340,10 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
     let Ok(view) = FrameView::parse(request.bytes) else { return };
     if exchange.is_part {
         return;
+    }
+    if exchange.is_cut_off {
+        model.traffic.in_flight.record_unsettled();
+        model.touch();
     }
     if exchange.earlier.is_empty() && !exchange.is_cut_off {
         let by_order = model.is_lost_by_order(request.time);

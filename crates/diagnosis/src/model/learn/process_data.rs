@@ -19,24 +19,25 @@ fn is_unordered(devices: &[Device], start: LogicalAddress, len: u16) -> bool {
         && owners(devices, start, len).next().is_none()
 }
 
+/// Index of an answer's datagram among those that are followed; `latest` is that of the answer before.
+fn known_datagram(cyclic: &[Cyclic], latest: usize, answer: &Answer<'_>) -> Option<usize> {
+    let (start, len) = (answer.reply.logical(), answer.reply.data_len() as u16);
+    let is_it = |cyclic: &Cyclic| {
+        cyclic.start == start && cyclic.len == len && cyclic.command == answer.command
+    };
+    // They come in the same order each cycle.
+    let guess = (latest + 1) % cyclic.len().max(1);
+    if cyclic.get(guess).is_some_and(is_it) { Some(guess) } else { cyclic.iter().position(is_it) }
+}
+
 /// A datagram to whoever has an FMMU there. Says whether an answer was expected.
 pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &Answer<'_>) -> bool {
     if !answer.is_last {
         return true;
     }
     let (start, len) = (answer.reply.logical(), answer.reply.data_len() as u16);
-    let is_it = |cyclic: &Cyclic| {
-        cyclic.start == start && cyclic.len == len && cyclic.command == answer.command
-    };
     let seen = Seen::new(answer.sum, answer.at, Some(answer.frame));
-    // They come in the same order each cycle.
-    let guess = (*latest + 1) % model.cyclic.len().max(1);
-    let found = if model.cyclic.get(guess).is_some_and(is_it) {
-        Some(guess)
-    } else {
-        model.cyclic.iter().position(is_it)
-    };
-    let Some(index) = found else {
+    let Some(index) = known_datagram(&model.cyclic, *latest, answer) else {
         if model.cyclic.len() < MOST_CYCLIC {
             *latest = model.cyclic.len();
             let planned = model.planned_exchange.counter(answer.command, start, len);

@@ -10,6 +10,7 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{DcTime32, Instant};
 
 use super::{Answer, part, word_at};
+use crate::model::set_up::SYNC_MANAGERS;
 use crate::model::{Chip, Device, LoopWrite, NetworkModel, Seen};
 
 const CHIP_TYPE: u16 = 0x0000;
@@ -40,6 +41,7 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
     let (at, frame) = (answer.at, Some(answer.frame));
     let Some(device) = model.devices.get_mut(id.index()) else { return };
     let mut news = false;
+    device.set_up.read(start, data, Seen::new((), at, frame));
     if start.0 <= AL_STATUS_CODE {
         if let Some([kind]) = part(data, start, CHIP_TYPE, 1) {
             let revision = part(data, start, CHIP_REVISION, 1).map_or(0, |byte| byte[0]);
@@ -215,6 +217,9 @@ pub(super) fn broadcast_write(model: &mut NetworkModel, answer: &Answer<'_>) {
         if touches(answer.ado, data, FMMUS) {
             device.fmmus.clear();
         }
+        if touches(answer.ado, data, SYNC_MANAGERS) {
+            device.set_up.sync_managers.clear();
+        }
     }
     if touches(answer.ado, data, FMMUS) {
         model.cyclic.iter_mut().for_each(|cyclic| cyclic.lay_out_anew(answer.at));
@@ -226,6 +231,7 @@ pub(super) fn broadcast_write(model: &mut NetworkModel, answer: &Answer<'_>) {
 
 fn write(device: &mut Device, answer: &Answer<'_>) -> bool {
     let (data, start) = (answer.written(), answer.ado);
+    device.set_up.written(start, data, Seen::new((), answer.at, Some(answer.frame)));
     if let Some(control) = part(data, start, AL_CONTROL, 1) {
         let control = AlControl(u16::from(control[0]));
         device

@@ -16,11 +16,11 @@ const DATA: u16 = 0x0508;
 /// Reads of the SII under way.
 #[derive(Clone, Default, Debug)]
 pub(super) struct Transfers {
-    by_device: BTreeMap<DeviceId, Transfer>,
+    by_device: BTreeMap<DeviceId, SiiRead>,
 }
 
 #[derive(Clone, Copy, Default, Debug)]
-struct Transfer {
+struct SiiRead {
     address: u32,
     /// A read was asked for, and is not known to have failed.
     is_read: bool,

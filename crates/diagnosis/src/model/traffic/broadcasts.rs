@@ -15,7 +15,7 @@ pub struct CountRise {
     pub more: Seen<u16>,
 }
 
-/// What broadcast reads tell. The learner fills it in, or an observation file.
+/// Results of broadcast reads. The learner fills them in, or an observation file.
 #[derive(Clone, Default, Debug)]
 pub struct BroadcastReads {
     most: u16,
@@ -32,12 +32,12 @@ pub struct BroadcastReads {
 impl BroadcastReads {
     // ---- what learner and observation files tell ----
 
-    /// So many controllers answer, and so many did at most, as somebody else counted them.
+    /// Takes the number of controllers that answer, and the most that did, as somebody else counted them.
     pub(crate) fn report(&mut self, most: u16, now: Option<Seen<u16>>) {
         (self.most, self.now) = (most, now);
     }
 
-    /// So many controllers answered a read that all answer. `can_rise` if process data are exchanged already and the
+    /// Takes the number of controllers that answered a read that all answer. `can_rise` if process data are exchanged already and the
     /// frame has no second copy: more of them than ever before have then come in the run. Says whether the number is
     /// another one.
     pub(crate) fn record(&mut self, seen: Seen<u16>, can_rise: bool) -> bool {
@@ -111,13 +111,13 @@ impl BroadcastReads {
         self.split
     }
 
-    /// Whether a broadcast read came back in two copies, and one of them alone was processed by anybody.
+    /// True if a broadcast read came back in two copies, and one of them alone was processed by anybody.
     #[must_use]
     pub const fn was_processed_by_one(&self) -> bool {
         self.was_processed_by_one
     }
 
-    /// Whether broadcast reads came back in two copies: both cards of a ring send them.
+    /// True if broadcast reads came back in two copies: both cards of a ring send them.
     #[must_use]
     pub const fn came_in_copies(&self) -> bool {
         self.was_processed_by_one || self.split.is_some()
@@ -137,7 +137,7 @@ impl BroadcastReads {
         self.positions
     }
 
-    /// How many controllers there are at least, by working counters and positions.
+    /// Least number of controllers, by working counters and positions.
     #[must_use]
     pub fn counted(&self) -> u16 {
         self.most.max(self.positions)

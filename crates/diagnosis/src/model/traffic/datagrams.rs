@@ -57,7 +57,7 @@ impl DatagramCounts {
         self.unanswered
     }
 
-    /// Those of them whose frame came back, while process data were exchanged: a MainDevice that starts asks for what is
+    /// Datagrams of these whose frame came back, while process data were exchanged: a MainDevice that starts asks for what is
     /// not there.
     #[must_use]
     pub const fn unanswered_alone(&self) -> u64 {

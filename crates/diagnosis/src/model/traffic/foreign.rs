@@ -24,13 +24,13 @@ impl ForeignFrames {
         self.count.is_power_of_two() || self.received == 1
     }
 
-    /// How many were seen.
+    /// Number of foreign frames that were seen.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
     }
 
-    /// Those of them that came in, as a live socket tells.
+    /// Number of them that came in, as a live socket tells.
     #[must_use]
     pub const fn received(&self) -> u64 {
         self.received

@@ -28,7 +28,7 @@ pub struct LostFrames {
 impl LostFrames {
     // ---- what intake, learner and observation files tell ----
 
-    /// So many frames were lost, as somebody else counted them.
+    /// Takes the number of lost frames that somebody else counted.
     pub fn report(&mut self, frames: Tally) {
         self.frames = frames;
     }

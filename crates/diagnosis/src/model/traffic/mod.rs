@@ -5,6 +5,7 @@
 pub mod broadcasts;
 pub mod datagrams;
 pub mod foreign;
+pub mod in_flight;
 pub mod losses;
 pub mod recording;
 pub mod returns;
@@ -15,6 +16,7 @@ use linesman_proto::time::Instant;
 pub use broadcasts::{BroadcastReads, CountRise};
 pub use datagrams::DatagramCounts;
 pub use foreign::ForeignFrames;
+pub use in_flight::FramesInFlight;
 pub use losses::LostFrames;
 pub use recording::RecordedFrames;
 pub use returns::{Requests, Returns};
@@ -23,15 +25,17 @@ pub use silence::Silence;
 use super::Seen;
 use crate::observe::Questions;
 
-/// What passed the observer.
+/// Frames that passed the observer.
 ///
 /// Frames that the second card of a ring sends only to see which way they come back are in the recording alone.
 #[derive(Clone, Default, Debug)]
 pub struct Traffic {
-    /// What was recorded, and what the recording lacks.
+    /// Frames that were recorded, and those that the recording lacks.
     pub recording: RecordedFrames,
     /// Frames on their way out, each once.
     pub requests: Requests,
+    /// Frames on their way.
+    pub in_flight: FramesInFlight,
     /// Frames that came back.
     pub returns: Returns,
     /// Frames that did not come back, or came back damaged or in one copy alone.
@@ -40,7 +44,7 @@ pub struct Traffic {
     pub foreign: ForeignFrames,
     /// Datagrams, and those that nobody answered.
     pub datagrams: DatagramCounts,
-    /// What broadcast reads tell.
+    /// Results of broadcast reads.
     pub broadcasts: BroadcastReads,
     /// Questions of Linesman beside this MainDevice; they are in no other count.
     pub questions: Questions,
@@ -82,7 +86,7 @@ impl Traffic {
         self.losses.end_silence(at);
     }
 
-    /// So many frames that were taken for requests are returns whose request was not seen.
+    /// Counts frames again as returns whose request was not seen; they were taken for requests.
     pub(crate) const fn record_mistaken(&mut self, count: u64) {
         self.requests.take_back(count);
         self.returns.take_over(count);
@@ -90,7 +94,7 @@ impl Traffic {
 
     // ---- what rules ask ----
 
-    /// Whether something may have been said between two times that is not in the recording: requests that were left
+    /// True if something may have been said between two times that is not in the recording: requests that were left
     /// out, frames that were cut off, or one direction only.
     #[must_use]
     pub fn may_lack(&self, from: Instant, to: Instant) -> bool {
@@ -98,7 +102,7 @@ impl Traffic {
         recording.cut() > 0 || self.is_one_sided() || recording.lacks_requests(from, to)
     }
 
-    /// Whether frames were seen in one direction only, though the other one must have been there:
+    /// True if frames were seen in one direction only, though the other one must have been there:
     /// returns without a request, or requests that a MainDevice makes only after answers.
     #[must_use]
     pub const fn is_one_sided(&self) -> bool {

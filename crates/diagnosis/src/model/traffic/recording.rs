@@ -1,4 +1,4 @@
-//! What was recorded of the frames of one network, and what the recording lacks.
+//! Recorded frames of one network, and those that the recording lacks.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ pub struct RecordedFrames {
     is_direction_known: bool,
     cut: u64,
     missed: u64,
-    /// Whether frames passed since the latest one that were not shown: the time to the next says nothing.
+    /// True if frames passed since the latest one that were not shown: the time to the next says nothing.
     is_gap_unknown: bool,
     has_gaps: bool,
     /// Before which recorded requests the latest gaps are, and when the request before each was recorded.
@@ -73,7 +73,7 @@ impl RecordedFrames {
         self.cut += 1;
     }
 
-    /// So many frames passed and were not shown.
+    /// Counts frames that passed and were not shown.
     pub(crate) const fn record_missed(&mut self, count: u64) {
         self.missed += count;
         self.is_gap_unknown = true;
@@ -113,7 +113,13 @@ impl RecordedFrames {
         self.first
     }
 
-    /// Whether any frame's direction was known for sure, as a live socket tells it.
+    /// When the latest frame was recorded.
+    #[must_use]
+    pub const fn last(&self) -> Option<Instant> {
+        self.last
+    }
+
+    /// True if any frame's direction was known for sure, as a live socket tells it.
     #[must_use]
     pub const fn is_direction_known(&self) -> bool {
         self.is_direction_known
@@ -131,19 +137,19 @@ impl RecordedFrames {
         self.missed
     }
 
-    /// Whether requests were sent that are not in the recording, as the numbers of the others tell.
+    /// True if requests were sent that are not in the recording, as the numbers of the others tell.
     #[must_use]
     pub const fn has_gaps(&self) -> bool {
         self.has_gaps
     }
 
-    /// Whether requests that were sent between two times are not in the recording.
+    /// True if requests that were sent between two times are not in the recording.
     #[must_use]
     pub(super) fn lacks_requests(&self, from: Instant, to: Instant) -> bool {
         self.gaps.iter().any(|gap| gap.from <= to && from <= gap.to)
     }
 
-    /// Whether the recording itself lacks frames of a short stretch of time, as the numbers of the others tell: then
+    /// True if the recording itself lacks frames of a short stretch of time, as the numbers of the others tell: then
     /// it has lost their returns, too. A link that was open would have been missed for longer.
     #[must_use]
     pub fn was_bad(&self, from: Instant, to: Instant) -> bool {

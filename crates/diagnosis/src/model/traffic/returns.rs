@@ -21,23 +21,23 @@ impl Requests {
         self.sent += 1;
     }
 
-    /// So many that were taken for requests are returns.
+    /// Takes frames out of the requests again: they are returns.
     pub(super) const fn take_back(&mut self, count: u64) {
         self.sent = self.sent.saturating_sub(count);
     }
 
-    /// Who sends requests is known anew.
+    /// Replaces the senders of requests.
     pub(crate) fn set_senders(&mut self, senders: &[Sender]) {
         self.senders = senders.to_vec();
     }
 
-    /// How many were sent.
+    /// Number of requests that were sent.
     #[must_use]
     pub const fn sent(&self) -> u64 {
         self.sent
     }
 
-    /// Who sent them, at most four.
+    /// Senders of the requests, at most four.
     #[must_use]
     pub fn senders(&self) -> &[Sender] {
         &self.senders
@@ -79,13 +79,13 @@ impl Returns {
         self.alone += 1;
     }
 
-    /// So many that were taken for requests are returns without one.
+    /// Counts frames as returns without a request; they were taken for requests.
     pub(super) const fn take_over(&mut self, count: u64) {
         self.count += count;
         self.alone += count;
     }
 
-    /// So many frames came back a second time.
+    /// Counts frames that came back a second time.
     pub(crate) const fn record_doubled(&mut self, count: u64) {
         self.doubled += count;
     }
@@ -97,13 +97,13 @@ impl Returns {
         self.latest_processed = Some(at);
     }
 
-    /// How many came back.
+    /// Number of frames that came back.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
     }
 
-    /// Those of them whose request was not seen.
+    /// Number of them whose request was not seen.
     #[must_use]
     pub const fn alone(&self) -> u64 {
         self.alone
@@ -121,7 +121,7 @@ impl Returns {
         self.latest
     }
 
-    /// Those that somebody had processed.
+    /// Number of them that somebody had processed.
     #[must_use]
     pub const fn processed(&self) -> u64 {
         self.processed

@@ -18,13 +18,13 @@ pub struct Silence {
     pub since: Seen<()>,
     /// The latest one.
     pub last: Seen<()>,
-    /// How many requests.
+    /// Number of requests.
     pub frames: u64,
     /// When something came back again.
     pub ended: Option<Instant>,
     /// When the two requests before the latest one were sent, the earlier one first.
     before_last: [Instant; 2],
-    /// How many frames had come back before.
+    /// Number of frames that had come back before.
     pub(super) returns_before: u64,
 }
 
@@ -42,7 +42,7 @@ impl Silence {
         self.frames += 1;
     }
 
-    /// Whether its latest three requests, at least, were sent from `from` on.
+    /// True if its latest three requests, at least, were sent from `from` on.
     #[must_use]
     pub fn has_three_since(&self, from: Instant) -> bool {
         self.frames >= 3 && self.before_last[0] >= from

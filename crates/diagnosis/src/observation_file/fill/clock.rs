@@ -13,13 +13,13 @@ const LONGEST_NS: i128 = 1_000_000_000_000_000_000;
 /// What the times of a file mean.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clock {
-    origin: Origin,
+    origin: ClockOrigin,
     base: Instant,
     end: Instant,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Origin {
+enum ClockOrigin {
     /// Nothing says a time.
     None,
     /// The earliest date, which is [`WATCH`] after 0.
@@ -43,12 +43,12 @@ impl Clock {
         let counted = file.readings.iter().filter(counts).filter_map(|one| one.at_s);
         let first_second = counted.chain(file.at_s).reduce(f64::min);
         let origin = match (first_date, first_second) {
-            (Some(date), _) => Origin::Date(date),
+            (Some(date), _) => ClockOrigin::Date(date),
             (None, Some(second)) if second < ROOM_S => {
-                Origin::Seconds(WATCH.as_secs_f64() - second)
+                ClockOrigin::Seconds(WATCH.as_secs_f64() - second)
             }
-            (None, Some(_) | None) if has_seconds => Origin::Seconds(0.0),
-            (None, Some(_) | None) => Origin::None,
+            (None, Some(_) | None) if has_seconds => ClockOrigin::Seconds(0.0),
+            (None, Some(_) | None) => ClockOrigin::None,
         };
         let mut clock = Self { origin, base: Instant::ZERO + WATCH, end: Instant::ZERO + WATCH };
         let latest = all.iter().filter_map(|(at, at_s)| clock.known(*at, *at_s)).max();
@@ -85,15 +85,15 @@ impl Clock {
 
     fn known(&self, at: Option<Date>, at_s: Option<f64>) -> Option<Instant> {
         match (self.origin, at, at_s) {
-            (Origin::Date(first), Some(at), _) => {
+            (ClockOrigin::Date(first), Some(at), _) => {
                 let ns = at.ns_since(first).clamp(0, LONGEST_NS);
                 Some(Instant::ZERO + WATCH + Span::ns(u64::try_from(ns).unwrap_or(0)))
             }
-            (Origin::Seconds(shift), _, Some(at)) => {
+            (ClockOrigin::Seconds(shift), _, Some(at)) => {
                 let seconds = (at + shift).clamp(0.0, 1e9);
                 Some(Instant::from_nanos((seconds * 1e9).round() as u64))
             }
-            (Origin::None | Origin::Date(_) | Origin::Seconds(_), _, _) => None,
+            (ClockOrigin::None | ClockOrigin::Date(_) | ClockOrigin::Seconds(_), _, _) => None,
         }
     }
 }
@@ -109,14 +109,14 @@ impl ObservationFile {
     /// Whether it gives times at all.
     #[must_use]
     pub fn has_times(&self) -> bool {
-        !self.times_are_assumed && !matches!(Clock::of(self).origin, Origin::None)
+        !self.times_are_assumed && !matches!(Clock::of(self).origin, ClockOrigin::None)
     }
 
     /// The date of the time 0 of the line, where the file gives dates: RFC 3339 without a zone.
     #[must_use]
     pub fn start(&self) -> Option<String> {
         let clock = Clock::of(self);
-        let Origin::Date(first) = clock.origin else { return None };
+        let ClockOrigin::Date(first) = clock.origin else { return None };
         let watch = jiff::SignedDuration::from_secs(60);
         first.0.checked_sub(watch).ok().map(|start| start.to_string())
     }

@@ -11,7 +11,7 @@ use super::device::Values;
 use crate::model::Device;
 
 /// Readings of some counters.
-type Counts = Vec<(ErrorCounter, u64)>;
+type CounterReadings = Vec<(ErrorCounter, u64)>;
 
 /// Records earlier and present values. Where nothing says what a counter was before, and it was read but
 /// once, it is taken for 0, and may be old.
@@ -21,7 +21,7 @@ pub(super) fn teach(
     values: &[(Instant, Values)],
     totals: bool,
 ) {
-    let read: Vec<(Instant, Counts)> =
+    let read: Vec<(Instant, CounterReadings)> =
         values.iter().map(|(at, read)| (*at, counts(read))).collect();
     let before: BTreeMap<ErrorCounter, u64> = earlier(observed).into_iter().collect();
     let mut times: BTreeMap<ErrorCounter, (u32, u64)> = BTreeMap::new();
@@ -38,7 +38,7 @@ pub(super) fn teach(
         let is_told = counter.port().is_some_and(|port| is_added_up[port]);
         totals || is_told || largest > Some(u64::from(u8::MAX))
     };
-    let mut begin = Counts::new();
+    let mut begin = CounterReadings::new();
     let mut may_be_old = Vec::new();
     for (counter, (times, _)) in &times {
         match before.get(counter) {
@@ -51,7 +51,7 @@ pub(super) fn teach(
         }
     }
     for (at, counts) in std::iter::once((Instant::ZERO, begin)).chain(read) {
-        let (wide, narrow): (Counts, Counts) =
+        let (wide, narrow): (CounterReadings, CounterReadings) =
             counts.into_iter().partition(|(counter, _)| is_total(counter));
         device.counters.record_totals(&wide, at, None);
         let mut registers = ErrorCounters::default();
@@ -65,9 +65,9 @@ pub(super) fn teach(
     }
 }
 
-fn counts(read: &Values) -> Counts {
+fn counts(read: &Values) -> CounterReadings {
     if read.is_absent() {
-        return Counts::new();
+        return CounterReadings::new();
     }
     let present = |port: &ObservedPort| port.counters();
     let ports = PortMap::from_fn(|port| read.ports[port].as_ref().map(present));
@@ -75,7 +75,7 @@ fn counts(read: &Values) -> Counts {
     of_ports(&ports).into_iter().chain(unit).collect()
 }
 
-fn earlier(observed: &ObservedDevice) -> Counts {
+fn earlier(observed: &ObservedDevice) -> CounterReadings {
     let inner = observed.ports.all();
     let outer = observed.before.as_ref().map(|before| before.ports.all()).unwrap_or_default();
     let ports = PortMap::from_fn(|port| {
@@ -87,8 +87,8 @@ fn earlier(observed: &ObservedDevice) -> Counts {
     of_ports(&ports).into_iter().chain(unit).collect()
 }
 
-fn of_ports(ports: &PortMap<Option<EarlierPort>>) -> Counts {
-    let mut found = Counts::new();
+fn of_ports(ports: &PortMap<Option<EarlierPort>>) -> CounterReadings {
+    let mut found = CounterReadings::new();
     for (port, counters) in ports.iter() {
         let Some(counters) = counters else { continue };
         let of_port = [

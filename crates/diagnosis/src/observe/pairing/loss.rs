@@ -3,7 +3,7 @@
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
-use super::{Exchange, Pairing, Pending, gap};
+use super::{Exchange, Pairing, PendingRequest, gap};
 
 /// So many later returns make a request lost that has been out for longer than [`REORDERED`].
 const OVERTAKEN: u16 = 16;
@@ -26,7 +26,7 @@ impl Pairing {
         for pending in self.pending.iter_mut().take(found) {
             pending.overtaken += 1;
         }
-        let is_lost = |oldest: &Pending| {
+        let is_lost = |oldest: &PendingRequest| {
             oldest.overtaken >= OVERTAKEN_BY_MANY
                 || (oldest.overtaken >= OVERTAKEN && gap(oldest.time, now) > REORDERED)
         };

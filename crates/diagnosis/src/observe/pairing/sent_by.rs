@@ -7,12 +7,12 @@
 use linesman_proto::address::Path;
 use linesman_proto::ethernet::MacAddress;
 
-use super::{Pairing, Pending};
+use super::{Pairing, PendingRequest};
 
 impl Pairing {
     /// The card that had sent what came back from `source` for a request; `None` where the cards cannot be
     /// told apart.
-    pub(super) fn sent_by(&self, pending: &Pending, source: MacAddress) -> Option<Path> {
+    pub(super) fn sent_by(&self, pending: &PendingRequest, source: MacAddress) -> Option<Path> {
         let first = pending.path.or_else(|| {
             let is_other = is_same(self.other_card?, pending.source);
             Some(if is_other { Path::B } else { Path::A })

@@ -25,17 +25,17 @@ const ROOM_S: f64 = 60.0;
 
 /// The clocks of a text.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Clock {
+enum TextClock {
     Date,
     Uptime,
     Yearless,
 }
 
-const fn clock_of(stamp: Stamp) -> Clock {
+const fn clock_of(stamp: Stamp) -> TextClock {
     match stamp {
-        Stamp::Date(_) => Clock::Date,
-        Stamp::Uptime(_) => Clock::Uptime,
-        Stamp::Yearless(_) => Clock::Yearless,
+        Stamp::Date(_) => TextClock::Date,
+        Stamp::Uptime(_) => TextClock::Uptime,
+        Stamp::Yearless(_) => TextClock::Yearless,
     }
 }
 
@@ -43,22 +43,22 @@ const fn clock_of(stamp: Stamp) -> Clock {
 #[derive(Clone, Debug)]
 pub(super) struct Timeline {
     /// The latest time of each clock.
-    last: BTreeMap<Clock, Stamp>,
+    last: BTreeMap<TextClock, Stamp>,
     /// The time of each fact of each block. A line without one was written with the one before it.
     stamps: Vec<Vec<Option<Stamp>>>,
     /// What the times of the file are: a date, or seconds.
-    end: End,
+    end: TimelineEnd,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum End {
+enum TimelineEnd {
     Date(Date),
     Seconds(f64),
 }
 
 impl Timeline {
     pub(super) fn of(blocks: &[Block], assumed: &mut Vec<String>) -> Self {
-        let mut last: BTreeMap<Clock, Stamp> = BTreeMap::new();
+        let mut last: BTreeMap<TextClock, Stamp> = BTreeMap::new();
         let stamps = blocks.iter().flat_map(|block| &block.facts).filter_map(|fact| fact.stamp);
         for stamp in stamps {
             let latest = last.entry(clock_of(stamp)).or_insert(stamp);
@@ -82,7 +82,7 @@ impl Timeline {
             stamps.collect()
         };
         let stamps = blocks.iter().map(of_block).collect();
-        let mut line = Self { last, stamps, end: End::Seconds(0.0) };
+        let mut line = Self { last, stamps, end: TimelineEnd::Seconds(0.0) };
         let mut longest: f64 = 0.0;
         for (index, block) in blocks.iter().enumerate() {
             for number in 0..block.facts.len() {
@@ -92,16 +92,16 @@ impl Timeline {
             }
         }
         let shift = SignedDuration::from_secs(1);
-        let date = match line.last.get(&Clock::Date) {
+        let date = match line.last.get(&TextClock::Date) {
             Some(Stamp::Date(Date(last))) => last.checked_add(shift).ok(),
             Some(_) | None => None,
         };
-        line.end = match (date, line.last.get(&Clock::Uptime)) {
-            (Some(date), _) => End::Date(Date(date)),
+        line.end = match (date, line.last.get(&TextClock::Uptime)) {
+            (Some(date), _) => TimelineEnd::Date(Date(date)),
             (None, Some(Stamp::Uptime(last))) if last + BEFORE_END_S >= longest => {
-                End::Seconds(last + BEFORE_END_S)
+                TimelineEnd::Seconds(last + BEFORE_END_S)
             }
-            (None, _) => End::Seconds(longest + ROOM_S),
+            (None, _) => TimelineEnd::Seconds(longest + ROOM_S),
         };
         line
     }
@@ -132,7 +132,7 @@ impl Timeline {
 
     /// Whether its times are made up: no line has one that says more than its distance from others.
     pub(super) fn is_assumed(&self) -> bool {
-        !self.last.contains_key(&Clock::Date) && !self.last.contains_key(&Clock::Uptime)
+        !self.last.contains_key(&TextClock::Date) && !self.last.contains_key(&TextClock::Uptime)
     }
 
     /// The time as a file gives it.
@@ -142,8 +142,8 @@ impl Timeline {
             ReadTime::Before(seconds) => seconds,
         };
         match self.end {
-            End::Seconds(end) => (None, Some((end - before).max(0.0))),
-            End::Date(Date(end)) => {
+            TimelineEnd::Seconds(end) => (None, Some((end - before).max(0.0))),
+            TimelineEnd::Date(Date(end)) => {
                 let before = SignedDuration::from_nanos((before * 1e9).round() as i64);
                 (Some(Date(end.checked_sub(before).unwrap_or(end))), None)
             }

@@ -29,14 +29,14 @@ fn frames(read: &ReadDevice) -> Vec<Option<u64>> {
 
 #[test]
 fn text_csv_and_single_blanks_give_the_same_list() {
-    let expected = Row {
+    let expected = OnlineRow {
         no: Some(2),
         address: Some(1002),
         name: "Term 2 (EL4102)".to_owned(),
         state: state_word::read("ERR SAFEOP"),
         crc: vec![0, 15],
         is_partial: true,
-        ..Row::default()
+        ..OnlineRow::default()
     };
     for row in [
         "2\t1002\tTerm 2 (EL4102)\tERR SAFEOP\t0, 15 (18)",

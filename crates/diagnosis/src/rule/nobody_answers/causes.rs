@@ -9,9 +9,9 @@ use crate::model::{NetworkModel, Seen, Silence};
 use crate::rule::View;
 use crate::rule::link_lost::is_on_terminal_bus;
 
-/// How likely it is the card.
+/// Likelihood that it is the card.
 const CARD: f64 = 0.1;
-/// How likely a first device that nobody ever saw is not there, or has a supply that failed with others'.
+/// Likelihood that a first device that nobody ever saw is not there, or has a supply that failed with others'.
 const NEVER_SEEN: f64 = 0.08;
 
 /// Frames do not come back at all: the first hop, or what is behind it.

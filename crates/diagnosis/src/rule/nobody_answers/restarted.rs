@@ -7,7 +7,7 @@ use super::{PAGE, first_device};
 use crate::finding::{Condition, Evidence, Place};
 use crate::model::{Device, NetworkModel, Seen, Silence};
 
-/// How many SubDevices, the first of the line among them, were given their station addresses anew after a silence: they
+/// SubDevices, the first of the line among them, that were given their station addresses anew after a silence: they
 /// had lost them, and their supply.
 pub(super) fn others_with(model: &NetworkModel, silence: &Silence) -> Option<(usize, Seen<()>)> {
     let ended = silence.ended?;

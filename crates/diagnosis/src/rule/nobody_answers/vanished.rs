@@ -15,7 +15,7 @@ use crate::rule::View;
 const LONG: u64 = 32;
 /// Cards are looked at now and then only: a silence must last so long before their link proves anything.
 const CARRIER_LATE: Span = Span::ms(300);
-/// So long after its link was lost a card takes no frames any more: drivers look for it every second or two.
+/// Time from the loss of its link until a card takes no frames any more: drivers look for it every second or two.
 const CARRIER_KNOWN: Span = Span::ms(2_200);
 /// Ports that were closed in a silence keep it from being one; what follows so soon belongs to it.
 const SAME_SILENCE: Span = Span::ms(100);
@@ -48,7 +48,7 @@ fn is_long(view: &View<'_>, silence: &Silence) -> bool {
     }
 }
 
-/// What a silence says; nothing, if it is damage that other rules place.
+/// Condition of a silence; none if it is damage that other rules place.
 pub(super) fn condition(
     view: &View<'_>,
     silence: &Silence,
@@ -77,9 +77,9 @@ pub(super) fn condition(
 struct Outage<'v> {
     view: &'v View<'v>,
     silence: Silence,
-    /// Whether anybody has answered before.
+    /// True if anybody has answered before.
     was_answered: bool,
-    /// Whether the card had a link, if that is known.
+    /// Link of the card, if that is known.
     carrier: Option<bool>,
     /// Damaged frames that the card received meanwhile, if it did.
     spoiled: Option<Tally>,
@@ -150,7 +150,7 @@ impl<'v> Outage<'v> {
         }
     }
 
-    /// What became of the requests, in words.
+    /// Fate of the requests, in words.
     fn requests(&self) -> String {
         let (frames, since) = (self.silence.frames, self.silence.since);
         let mut swallowed = self.view.model.traffic.losses.swallowed().iter();
@@ -165,7 +165,7 @@ impl<'v> Outage<'v> {
         }
     }
 
-    /// What tells that the card had a link, or none.
+    /// Evidence that the card had a link, or none.
     fn link_of_card(&self, carrier: bool) -> Evidence {
         let (model, silence) = (self.view.model, &self.silence);
         let told = model.host.card(Path::A).carrier.map(|carrier| carrier.at);
@@ -251,7 +251,7 @@ fn found_hole(model: &NetworkModel, silence: &Silence) -> Option<Seen<usize>> {
     model.hole.filter(|hole| hole.since == silence.since && has_link)?.found
 }
 
-/// Whether a silence is over, and neither a link nor the first SubDevice was lost meanwhile, as what was
+/// True if a silence is over, and neither a link nor the first SubDevice was lost meanwhile, as what was
 /// read of the first SubDevice since then shows.
 fn nothing_was_cut(view: &View<'_>, silence: &Silence) -> bool {
     let model = view.model;
@@ -272,14 +272,14 @@ fn nothing_was_cut(view: &View<'_>, silence: &Silence) -> bool {
     was_read && !was_card_cut && !has_fallen && !input.any_link_changed(silence.since.at, ended)
 }
 
-/// Whether other frames were lost than those of a silence, with others coming back between them.
+/// True if other frames were lost than those of a silence, with others coming back between them.
 fn is_among_others(model: &NetworkModel, silence: &Silence) -> bool {
     let lost = model.traffic.losses.frames();
     let share = lost.of_spell().saturating_sub(silence.frames);
     share >= FEW && share * 50 >= silence.frames
 }
 
-/// Whether the card had a link during a silence; `None` when neither the host says so nor anybody who searched
+/// Link of the card during a silence; `None` when neither the host says so nor anybody who searched
 /// for the place, which nobody does without one, nor frames that went on leaving it.
 fn carrier_during(model: &NetworkModel, silence: &Silence) -> Option<bool> {
     let card = model.host.card(Path::A);
@@ -291,7 +291,7 @@ fn carrier_during(model: &NetworkModel, silence: &Silence) -> Option<bool> {
     Some(carrier.value && !came_back)
 }
 
-/// Whether frames were seen to leave the card itself for so long that it had a link: the system hands none to a card
+/// True if frames were seen to leave the card itself for so long that it had a link: the system hands none to a card
 /// without one, once it knows.
 fn went_on_leaving(model: &NetworkModel, silence: &Silence) -> bool {
     let is_host = model.traffic.requests.senders().iter().any(|sender| sender.is_host);

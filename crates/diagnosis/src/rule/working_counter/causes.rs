@@ -7,7 +7,7 @@ use linesman_config::fault::FaultName::{
 
 use crate::model::Trouble;
 
-/// What is seen of the SubDevices that may be the cause.
+/// Signs seen of the SubDevices that may be the cause.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum DeficitSymptom {
     /// Again and again for a moment: a contact that opens, and nothing that hangs.

@@ -12,7 +12,7 @@ use crate::rule::link_lost::is_on_terminal_bus;
 
 /// Datagrams of one cycle, and of slower ones, lose their shares so soon after each other.
 const AT_ONCE: Span = Span::ms(500);
-/// What was on its way when a link was lost comes back by then.
+/// Time by which frames that were on their way when a link was lost come back.
 const ANSWERS_LATE: Span = Span::ms(100);
 /// One device that fails alone has other reasons.
 const SEVERAL: usize = 2;
@@ -68,7 +68,7 @@ fn is_between(tree: &Tree, node: usize) -> bool {
         && tree.link_above(node).is_none_or(|link| !tree.is_on_ring(link))
 }
 
-/// Whether a SubDevice answered in the time of a deficit.
+/// True if a SubDevice answered in the time of a deficit.
 fn is_heard(model: &NetworkModel, node: usize, deficit: &Deficit) -> bool {
     let (device, from) = (&model.devices[node], deficit.first.at + ANSWERS_LATE);
     match deficit.ended {
@@ -77,7 +77,7 @@ fn is_heard(model: &NetworkModel, node: usize, deficit: &Deficit) -> bool {
     }
 }
 
-/// Whether the near end told of its link since: then that is known, and other rules tell.
+/// True if the near end told of its link since: then that is known, and other rules tell.
 fn is_link_read(
     model: &NetworkModel,
     tree: &Tree,
@@ -97,7 +97,7 @@ fn owners(model: &NetworkModel, behind: &[usize]) -> usize {
     behind.iter().filter(is_owner).count()
 }
 
-/// Whether a datagram lacks just the shares of all that is behind, or nothing where they have none in it.
+/// True if a datagram lacks just the shares of all that is behind, or nothing where they have none in it.
 fn lacks(model: &NetworkModel, cyclic: &Cyclic, behind: &[usize], since: Instant) -> bool {
     let own = model.owners(cyclic).filter(|owner| behind.contains(&owner.device.index()));
     let share: u16 = own.filter_map(|owner| shares(cyclic, &owner).first().copied()).sum();

@@ -16,7 +16,7 @@ use linesman_proto::time::Instant;
 use linesman_sim::truth::{Effect, Entry, FaultId, TruthLog};
 
 use super::case::{Case, CaseKind, ScoreOptions};
-use super::judge::alarms;
+use super::judge::Accusations;
 use super::listen::leaves_a_state;
 use super::play::play_taped;
 use super::recorder::{RecordedFrame, SharedRecording};
@@ -178,6 +178,7 @@ fn judge(taped: &RecordedCase, cut: Cut, frames: &[RecordedFrame]) -> ExcerptRep
             number,
             fcs: frame.fcs,
             truncated: kept < frame.bytes.len(),
+            probe: None,
             bytes: &frame.bytes[..kept],
         });
     }
@@ -195,7 +196,7 @@ fn judge(taped: &RecordedCase, cut: Cut, frames: &[RecordedFrame]) -> ExcerptRep
         frames: frames.len() as u64,
         faults,
         verdict: diagnosis.verdict,
-        findings: alarms(&diagnosis),
+        findings: Accusations::of(&diagnosis).alarms,
         missing: diagnosis.coverage.essential_gaps().map(|gap| gap.text.clone()).collect(),
         traces: trace::find(&taped.frames, frames, cut.snap),
     }

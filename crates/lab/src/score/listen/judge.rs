@@ -2,13 +2,12 @@
 
 use linesman_config::fault::FaultName::{self, *};
 use linesman_diagnosis::report::{Diagnosis, FindingReport, Verdict};
-use linesman_proto::time::Span;
 
-use super::super::judge::{Judged, alarms, judge};
+use super::super::judge::{Accusations, Candidates, Judged, judge};
 use super::super::trace::Trace;
 use super::{Listened, Outcome};
 use crate::verdict::judge::{JudgedFault, is_left_open, may_be};
-use crate::verdict::{Match, Naming, Scene, Truth};
+use crate::verdict::{Naming, Scene, Truth};
 
 /// What lost frames may be, where nothing but the frames is known.
 pub(super) const LOSSES: [FaultName; 9] = [
@@ -35,23 +34,16 @@ pub(in crate::score) fn judge_listener(
 ) -> Listened {
     let Some(diagnosis) = said else {
         return Listened {
-            judged: Judged {
-                fits: Match::NONE,
-                said: "nothing was heard".to_owned(),
-                confidence: 0.0,
-                others: 0,
-                findings: Vec::new(),
-                cycles: None,
-                named_after: None::<Span>,
-            },
+            judged: Judged { said: "nothing was heard".to_owned(), ..Judged::silence() },
             outcome: Outcome::Open,
             is_named: false,
             verdict: None,
         };
     };
-    let mut judged = judge(diagnosis, truth, all, scene, (context, 1), naming);
+    let mut judged =
+        judge(diagnosis, truth, all, scene, Candidates { context, among: 1, taken: None }, naming);
     let first = diagnosis.findings.first();
-    let is_quiet = alarms(diagnosis).is_empty();
+    let is_quiet = Accusations::of(diagnosis).alarms.is_empty();
     let outcome = if judged.fits.place.is_right() {
         Outcome::Found
     } else if is_quiet && traces.is_empty() {

@@ -12,6 +12,7 @@ pub mod report;
 pub(super) mod tally;
 
 use linesman_diagnosis::report::Verdict;
+use serde::{Deserialize, Serialize};
 
 use super::judge::Judged;
 use super::recorder::RecordedFrame;
@@ -19,7 +20,7 @@ use super::recorder::RecordedFrame;
 pub(super) use join::leaves_a_state;
 
 /// What became of a listener's answer.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize, Deserialize)]
 pub enum Outcome {
     /// The first finding is at the right place, or at one that is admitted.
     Found,
@@ -34,7 +35,7 @@ pub enum Outcome {
 }
 
 /// What a listener said of a fault.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Listened {
     /// The first finding, held against the truth.
     pub judged: Judged,
@@ -47,7 +48,7 @@ pub struct Listened {
 }
 
 /// A listener without and with the project.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Pair {
     /// It knows nothing but what it hears.
     pub alone: Listened,
@@ -56,7 +57,7 @@ pub struct Pair {
 }
 
 /// The listeners of a case.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Listeners {
     /// From the start.
     pub start: Pair,
@@ -76,14 +77,14 @@ pub struct Heard {
 }
 
 /// What listeners said of a healthy line: alarms, and whether it was called healthy.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct HealthyListened {
     /// From the start, without and with the project, then joined late, without and with it.
     pub columns: [HealthySaid; 4],
 }
 
 /// What one listener said of a healthy line.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct HealthySaid {
     /// Warnings and errors.
     pub alarms: Vec<String>,

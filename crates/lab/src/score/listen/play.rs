@@ -121,6 +121,7 @@ impl ListenerRun {
             number,
             fcs: frame.fcs,
             truncated: false,
+            probe: None,
             bytes: &frame.bytes,
         });
         if is_first && self.is_late {

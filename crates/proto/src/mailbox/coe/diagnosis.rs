@@ -274,6 +274,30 @@ mod tests {
         assert!(message.write(&mut bytes[..len - 1]).is_err());
     }
 
+    // proves: SW-08
+    #[test]
+    fn the_five_messages_of_the_sources_are_read_with_type_flags_and_time() {
+        let table = [
+            (0x02, Severity::Error, 0x4413, 5_000_000_000_u64),
+            (0x01, Severity::Warning, 0x4101, 4_000_000_000),
+            (0x12, Severity::Error, 0x8406, 3_000_000_000),
+            (0x00, Severity::Information, 0x0002, 2_000_000_000),
+            (0x10, Severity::Information, 0x0003, 1_000_000_000),
+        ];
+        for (flags, severity, text, time_ns) in table {
+            let mut bytes = vec![0x00, 0xE0, 0x15, 0x1B, flags, 1];
+            bytes.extend_from_slice(&u16::to_le_bytes(text));
+            bytes.extend_from_slice(&u64::to_le_bytes(time_ns));
+            bytes.extend_from_slice(&[0x05, 0x00, 0x07]);
+            let message = DiagnosisMessage::parse(&bytes).unwrap();
+            assert_eq!((message.code, message.severity), (0x1B15_E000, severity), "{text:04X}");
+            assert_eq!((message.text, message.time_ns), (text, time_ns));
+            assert_eq!(message.local_time, flags & 0x10 != 0, "{text:04X}");
+            let parameters: Vec<Parameter<'_>> = message.parameters().collect();
+            assert_eq!(parameters, [Parameter::Value(DataType::USINT, &[7])], "{text:04X}");
+        }
+    }
+
     #[test]
     fn parameters_that_are_cut_off_end_the_list() {
         for rest in [&[0x07, 0x00, 1, 2, 3][..], &[0x05], &[0x09, 0x00, 1], &[0, 0xF0, 1], &[]] {

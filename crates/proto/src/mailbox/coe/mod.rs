@@ -12,6 +12,7 @@ pub mod message;
 pub mod object;
 pub mod sdo;
 pub mod standard_object;
+pub mod sync_parameters;
 pub mod sync_types;
 
 pub use data_type::DataType;

@@ -37,7 +37,7 @@ fn wired(on: &[(usize, Port)]) -> Tree {
     Tree::from_wiring(&std::iter::once(first).chain(rest).collect::<Vec<_>>(), None).unwrap()
 }
 
-// proves: ESC-13 partial
+// proves: ESC-13
 #[test]
 fn the_fifteen_line_follows_from_open_ports_in_both_variants() {
     for branch in [B, C] {

@@ -28,7 +28,7 @@ fn listed(branch: usize) -> Vec<(usize, usize)> {
     steps
 }
 
-// proves: HW-18 partial, HW-22 partial, ESC-13 partial
+// proves: HW-18, HW-22, ESC-13 partial
 #[test]
 fn the_fifteen_line_is_checked_in_the_29_listed_steps() {
     for branch in [C, B] {

@@ -53,7 +53,7 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-// proves: FRM-02 partial, FRM-03 partial, FRM-05 partial, FRM-15 partial, ESC-07 partial
+// proves: FRM-02 partial, FRM-03, FRM-05 partial, FRM-15 partial, ESC-07 partial
 #[test]
 fn every_command_does_what_its_row_says() {
     for place in PLACES {

@@ -5,7 +5,7 @@
 
 use linesman_proto::time::Instant;
 
-use super::{Channel, Value};
+use super::{Channel, ChannelValue};
 use crate::device::dictionary::Dictionary;
 use crate::device::signal::{SignalId, Signals};
 
@@ -57,14 +57,14 @@ mod setting {
 /// Scaling by the user: gain in 1/65536, then offset.
 #[derive(Clone, Copy, Debug)]
 struct Scale {
-    on: Value,
-    offset: Value,
-    gain: Value,
+    on: ChannelValue,
+    offset: ChannelValue,
+    gain: ChannelValue,
 }
 
 impl Scale {
     fn of(dictionary: &Dictionary, settings: u16) -> Self {
-        let value = |subindex| Value::of(dictionary, settings, subindex);
+        let value = |subindex| ChannelValue::of(dictionary, settings, subindex);
         Self {
             on: value(setting::USER_SCALE),
             offset: value(setting::OFFSET),
@@ -89,20 +89,20 @@ pub struct AnalogInput {
     range: Range,
     /// What makes the waves of several channels differ.
     phase: u64,
-    underrange: Value,
-    overrange: Value,
+    underrange: ChannelValue,
+    overrange: ChannelValue,
     limits: [Limit; 2],
-    error: Value,
-    toggle: Value,
-    value: Value,
+    error: ChannelValue,
+    toggle: ChannelValue,
+    value: ChannelValue,
     scale: Scale,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Limit {
-    status: Value,
-    on: Value,
-    at: Value,
+    status: ChannelValue,
+    on: ChannelValue,
+    at: ChannelValue,
 }
 
 impl Limit {
@@ -126,11 +126,11 @@ impl AnalogInput {
     #[must_use]
     pub fn new(dictionary: &Dictionary, channel: u8, range: Range, signal: SignalId) -> Self {
         let (object, settings) = objects(0x6000, channel);
-        let value = |subindex| Value::of(dictionary, object, subindex);
+        let value = |subindex| ChannelValue::of(dictionary, object, subindex);
         let limit = |status, on, at| Limit {
             status: value(status),
-            on: Value::of(dictionary, settings, on),
-            at: Value::of(dictionary, settings, at),
+            on: ChannelValue::of(dictionary, settings, on),
+            at: ChannelValue::of(dictionary, settings, at),
         };
         Self {
             signal,
@@ -189,8 +189,8 @@ fn wave(now: Instant, phase: u64, range: Range) -> i32 {
 pub struct AnalogOutput {
     signal: SignalId,
     range: Range,
-    value: Value,
-    default: Value,
+    value: ChannelValue,
+    default: ChannelValue,
     scale: Scale,
 }
 
@@ -208,8 +208,8 @@ impl AnalogOutput {
         Self {
             signal,
             range,
-            value: Value::of(dictionary, object, subindex),
-            default: Value::of(dictionary, settings, setting::DEFAULT_OUTPUT),
+            value: ChannelValue::of(dictionary, object, subindex),
+            default: ChannelValue::of(dictionary, settings, setting::DEFAULT_OUTPUT),
             scale: Scale::of(dictionary, settings),
         }
     }

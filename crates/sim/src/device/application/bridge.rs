@@ -8,7 +8,7 @@
 use linesman_proto::time::Instant;
 
 use super::two_times::TwoTimes;
-use super::{Channel, Value};
+use super::{Channel, ChannelValue};
 use crate::device::dictionary::Dictionary;
 use crate::device::signal::{SignalId, Signals};
 
@@ -21,8 +21,8 @@ pub const INPUTS: u16 = 0x6000;
 #[derive(Clone, Debug)]
 pub struct Bridge {
     times: TwoTimes,
-    outputs: Vec<(Value, SignalId)>,
-    inputs: Vec<(Value, SignalId)>,
+    outputs: Vec<(ChannelValue, SignalId)>,
+    inputs: Vec<(ChannelValue, SignalId)>,
 }
 
 impl Bridge {
@@ -35,7 +35,7 @@ impl Bridge {
         ahead: SignalId,
     ) -> Self {
         let of = |index, signals: &[SignalId]| {
-            let values = (1u8..=255).map(|subindex| Value::of(dictionary, index, subindex));
+            let values = (1u8..=255).map(|subindex| ChannelValue::of(dictionary, index, subindex));
             values.zip(signals.iter().copied()).collect()
         };
         Self {

@@ -2,14 +2,14 @@
 
 use linesman_proto::time::Instant;
 
-use super::{Channel, Value};
+use super::{Channel, ChannelValue};
 use crate::device::dictionary::Dictionary;
 use crate::device::signal::{SignalId, Signals};
 
 /// A digital output.
 #[derive(Clone, Debug)]
 pub struct DigitalOutput {
-    value: Value,
+    value: ChannelValue,
     signal: SignalId,
 }
 
@@ -17,7 +17,7 @@ impl DigitalOutput {
     /// The output whose value is this entry.
     #[must_use]
     pub fn new(dictionary: &Dictionary, index: u16, subindex: u8, signal: SignalId) -> Self {
-        Self { value: Value::of(dictionary, index, subindex), signal }
+        Self { value: ChannelValue::of(dictionary, index, subindex), signal }
     }
 }
 

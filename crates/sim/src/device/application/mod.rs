@@ -49,9 +49,9 @@ pub trait Channel: Debug + Send {
 
 /// An object of a channel, which a type may lack.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Value(Option<EntryRef>);
+struct ChannelValue(Option<EntryRef>);
 
-impl Value {
+impl ChannelValue {
     fn of(dictionary: &Dictionary, index: u16, subindex: u8) -> Self {
         Self(dictionary.find(ObjectAddress::new(index, subindex)))
     }

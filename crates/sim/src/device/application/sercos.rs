@@ -8,7 +8,7 @@
 use linesman_proto::time::Instant;
 
 use super::motion::{Goal, Limits, Motion};
-use super::{Channel, Value};
+use super::{Channel, ChannelValue};
 use crate::device::dictionary::Dictionary;
 use crate::device::signal::{SignalId, Signals};
 
@@ -26,10 +26,10 @@ const LIMITS: Limits = Limits { velocity: 104_857_600.0, acceleration: 2_097_152
 pub struct Sercos {
     position_signal: SignalId,
     blocked: SignalId,
-    control: Value,
-    command: Value,
-    status: Value,
-    feedback: Value,
+    control: ChannelValue,
+    command: ChannelValue,
+    status: ChannelValue,
+    feedback: ChannelValue,
     control_word: u16,
     motion: Motion,
 }
@@ -38,7 +38,7 @@ impl Sercos {
     /// The axis with the IDNs of its telegrams.
     #[must_use]
     pub fn new(dictionary: &Dictionary, position: SignalId, blocked: SignalId) -> Self {
-        let value = |idn| Value::of(dictionary, idn, 0);
+        let value = |idn| ChannelValue::of(dictionary, idn, 0);
         Self {
             position_signal: position,
             blocked,

@@ -6,7 +6,7 @@
 
 use linesman_proto::time::Instant;
 
-use super::{Channel, Value};
+use super::{Channel, ChannelValue};
 use crate::device::dictionary::Dictionary;
 use crate::device::signal::{SignalId, Signals};
 
@@ -39,31 +39,31 @@ pub struct Stepper {
 
 #[derive(Clone, Copy, Debug)]
 struct Encoder {
-    set_counter: Value,
-    set_value: Value,
-    set_done: Value,
-    toggle: Value,
-    counter: Value,
+    set_counter: ChannelValue,
+    set_value: ChannelValue,
+    set_done: ChannelValue,
+    toggle: ChannelValue,
+    counter: ChannelValue,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct Motor {
-    enable: Value,
-    velocity: Value,
-    speed_range: Value,
-    ready_to_enable: Value,
-    ready: Value,
-    moving_positive: Value,
-    moving_negative: Value,
-    inputs: [Value; 2],
-    toggle: Value,
+    enable: ChannelValue,
+    velocity: ChannelValue,
+    speed_range: ChannelValue,
+    ready_to_enable: ChannelValue,
+    ready: ChannelValue,
+    moving_positive: ChannelValue,
+    moving_negative: ChannelValue,
+    inputs: [ChannelValue; 2],
+    toggle: ChannelValue,
 }
 
 impl Stepper {
     /// The axis with encoder objects 0x6000/0x7000 and motor objects 0x6010/0x7010.
     #[must_use]
     pub fn new(dictionary: &Dictionary, position: SignalId, inputs: [SignalId; 2]) -> Self {
-        let value = |index, subindex| Value::of(dictionary, index, subindex);
+        let value = |index, subindex| ChannelValue::of(dictionary, index, subindex);
         Self {
             position_signal: position,
             inputs,

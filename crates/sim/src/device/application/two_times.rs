@@ -7,7 +7,7 @@
 
 use linesman_proto::time::Instant;
 
-use super::{Channel, Value};
+use super::{Channel, ChannelValue};
 use crate::device::dictionary::Dictionary;
 use crate::device::signal::{SignalId, Signals};
 
@@ -22,28 +22,28 @@ pub struct TwoTimes {
     /// The other side is there, whatever its time is.
     connected: bool,
     system_time: u64,
-    secondary_leads: Value,
-    mode: Value,
-    control_toggle: Value,
-    stamp_toggle: Value,
-    alone: Value,
-    internal: Value,
-    external: Value,
-    control: Value,
+    secondary_leads: ChannelValue,
+    mode: ChannelValue,
+    control_toggle: ChannelValue,
+    stamp_toggle: ChannelValue,
+    alone: ChannelValue,
+    internal: ChannelValue,
+    external: ChannelValue,
+    control: ChannelValue,
     /// Toggle bits of the PDOs: status word of each of them.
-    toggles: [Value; 4],
+    toggles: [ChannelValue; 4],
 }
 
 impl TwoTimes {
     /// With the objects of external synchronisation.
     #[must_use]
     pub fn new(dictionary: &Dictionary, ahead: SignalId) -> Self {
-        let value = |subindex| Value::of(dictionary, 0x10F4, subindex);
+        let value = |subindex| ChannelValue::of(dictionary, 0x10F4, subindex);
         Self {
             ahead,
             connected: false,
             system_time: 0,
-            secondary_leads: Value::of(dictionary, 0x10F5, 0x01),
+            secondary_leads: ChannelValue::of(dictionary, 0x10F5, 0x01),
             mode: value(0x01),
             control_toggle: value(0x0E),
             stamp_toggle: value(0x0F),
@@ -52,7 +52,7 @@ impl TwoTimes {
             external: value(0x12),
             control: value(0x13),
             toggles: [0x1800, 0x1801, 0x1802, 0x1803]
-                .map(|parameter| Value::of(dictionary, parameter, 0x09)),
+                .map(|parameter| ChannelValue::of(dictionary, parameter, 0x09)),
         }
     }
 
@@ -62,7 +62,7 @@ impl TwoTimes {
         self.connected = connected;
     }
 
-    fn toggle(value: Value, dictionary: &mut Dictionary) {
+    fn toggle(value: ChannelValue, dictionary: &mut Dictionary) {
         let on = !value.is_set(dictionary);
         value.set_bit(dictionary, on);
     }

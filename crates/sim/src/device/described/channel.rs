@@ -9,7 +9,7 @@ use crate::device::signal::{SignalId, Signals};
 
 /// An object and the signals that carry its value, lowest 32 bits first.
 #[derive(Clone, Debug)]
-struct Carried {
+struct ObjectSignals {
     entry: EntryRef,
     bits: usize,
     signals: Vec<SignalId>,
@@ -17,9 +17,9 @@ struct Carried {
 
 /// Objects with their signals, as far as the dictionary has them.
 #[derive(Clone, Default, Debug)]
-struct List(Vec<Carried>);
+struct ChannelObjects(Vec<ObjectSignals>);
 
-impl List {
+impl ChannelObjects {
     fn push(
         &mut self,
         dictionary: &Dictionary,
@@ -28,14 +28,14 @@ impl List {
         signals: &[SignalId],
     ) {
         if let Some(entry) = dictionary.find(address) {
-            self.0.push(Carried { entry, bits, signals: signals.to_vec() });
+            self.0.push(ObjectSignals { entry, bits, signals: signals.to_vec() });
         }
     }
 }
 
 /// Outputs: each object drives its signals.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Driven(List);
+pub(super) struct Driven(ChannelObjects);
 
 impl Driven {
     pub(super) fn push(
@@ -48,7 +48,7 @@ impl Driven {
         self.0.push(dictionary, address, bits, signals);
     }
 
-    fn set_all(&self, signals: &mut Signals, value: impl Fn(&Carried) -> u64) {
+    fn set_all(&self, signals: &mut Signals, value: impl Fn(&ObjectSignals) -> u64) {
         for carried in &self.0.0 {
             let value = value(carried);
             for (signal, shift) in carried.signals.iter().zip([0, 32]) {
@@ -74,7 +74,7 @@ impl Channel for Driven {
 
 /// Inputs: each object takes what its signals carry. One that nothing drives keeps its value.
 #[derive(Clone, Default, Debug)]
-pub(super) struct Taken(List);
+pub(super) struct Taken(ChannelObjects);
 
 impl Taken {
     pub(super) fn push(

@@ -35,8 +35,8 @@ pub(super) fn of(image: &Image) -> Result<Hardware, DescribedError> {
 /// The same, where it is said what the controller has at least.
 pub(super) fn with(image: &Image, said: &EsiController) -> Result<Hardware, DescribedError> {
     let ports = ports(image);
-    let needs = Needs::of(image)?;
-    let needs = Needs {
+    let needs = ChipNeeds::of(image)?;
+    let needs = ChipNeeds {
         fmmus: needs.fmmus.max(said.fmmus.min(MOST_UNITS as u8)),
         sync_managers: needs.sync_managers.max(said.sync_managers.min(MOST_UNITS as u8)),
         ram_kib: needs.ram_kib.max((said.ram_bytes / 1024).min(LARGEST_RAM) as u8),
@@ -66,13 +66,13 @@ pub(super) fn with(image: &Image, said: &EsiController) -> Result<Hardware, Desc
 }
 
 /// What a controller has to have.
-struct Needs {
+struct ChipNeeds {
     fmmus: u8,
     sync_managers: u8,
     ram_kib: u8,
 }
 
-impl Needs {
+impl ChipNeeds {
     fn of(image: &Image) -> Result<Self, DescribedError> {
         let beyond = |what: &str, found: usize, most: usize| DescribedError::Beyond {
             what: what.to_owned(),

@@ -1,12 +1,14 @@
 //! The library as a MainDevice finds it.
 
 use linesman_config::profile::DeviceProfile;
+use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::{Checksum, Direction, Image, SyncManagerKind};
 
 use super::spec::NOBODY;
 use super::{LibraryType, build, build_revision, find, types};
 use crate::device::Signals;
 use crate::device::tests::Device;
+use crate::hardware::PortKind;
 
 #[test]
 fn every_type_is_found_once_and_bears_a_sound_image() {
@@ -144,6 +146,39 @@ fn another_revision_shows_in_identity_and_dictionary() {
     let mut device = Device::new(built, signals);
     device.enter_preop();
     assert_eq!(device.upload(0x1018, 3), Ok(vec![0, 0, 0x15, 0]));
+}
+
+// proves: ESC-11, JCT-01, JCT-10
+#[test]
+fn couplers_and_junctions_have_the_ports_of_their_data_sheets() {
+    use Port::{A, B, C, D};
+    let table: [(&str, &[&[Port]]); 13] = [
+        ("EL1008", &[&[A, B]]),
+        ("EL3104", &[&[A, B]]),
+        ("EK1100", &[&[A, B, C]]),
+        ("EK1101", &[&[A, B, C]]),
+        ("EK1110", &[&[A, B]]),
+        ("EK1121-0010", &[&[A, C, D]]),
+        ("EK1521", &[&[A, C, D]]),
+        ("EK1561", &[&[A, C, D]]),
+        ("EK1122", &[&[A, B, C, D]]),
+        ("EP1122-0001", &[&[A, B, C, D]]),
+        ("CU1123", &[&[A, B, C]]),
+        ("CU1124", &[&[A, B, C, D]]),
+        ("CU1128", &[&[A, B, C, D], &[A, B, C, D], &[A, B, C, D]]),
+    ];
+    for (name, expected) in table {
+        let found = find(name).unwrap();
+        let present = |ports: &PortMap<PortKind>| -> Vec<Port> {
+            ports
+                .iter()
+                .filter(|(_, kind)| **kind != PortKind::Absent)
+                .map(|(port, _)| port)
+                .collect()
+        };
+        let ports: Vec<Vec<Port>> = found.ports().map(|ports| present(&ports)).collect();
+        assert_eq!(ports, expected, "{name}");
+    }
 }
 
 #[test]

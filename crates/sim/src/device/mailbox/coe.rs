@@ -16,12 +16,12 @@ use crate::device::software_fault::RefusedWith;
 /// The server.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub(super) struct CoeServer {
-    transfer: Option<Transfer>,
+    transfer: Option<ServedSdo>,
 }
 
 /// A transfer that takes several messages.
 #[derive(Clone, PartialEq, Eq, Debug)]
-enum Transfer {
+enum ServedSdo {
     Upload { object: ObjectAddress, data: Vec<u8>, sent: usize, toggle: bool },
     Download { object: ObjectAddress, complete: bool, size: usize, data: Vec<u8>, toggle: bool },
 }
@@ -109,13 +109,13 @@ impl CoeServer {
         let body = write(&Message::SdoResponse(Response::Upload { object, complete, initial }));
         if !initial.is_complete() {
             let sent = initial.data().len();
-            self.transfer = Some(Transfer::Upload { object, data, sent, toggle: false });
+            self.transfer = Some(ServedSdo::Upload { object, data, sent, toggle: false });
         }
         body
     }
 
     fn upload_segment(&mut self, asked: bool, room: usize) -> Vec<u8> {
-        let Some(Transfer::Upload { object, data, sent, toggle }) = self.transfer.take() else {
+        let Some(ServedSdo::Upload { object, data, sent, toggle }) = self.transfer.take() else {
             return abort(ObjectAddress::new(0, 0), SdoAbortCode::COMMAND_SPECIFIER);
         };
         if asked != toggle {
@@ -125,7 +125,7 @@ impl CoeServer {
         let body = write(&Message::SdoResponse(Response::UploadSegment(segment)));
         if !segment.last {
             let sent = sent + segment.data.len();
-            self.transfer = Some(Transfer::Upload { object, data, sent, toggle: !toggle });
+            self.transfer = Some(ServedSdo::Upload { object, data, sent, toggle: !toggle });
         }
         body
     }
@@ -152,7 +152,7 @@ impl CoeServer {
             return abort(object, SdoAbortCode::OUT_OF_MEMORY);
         }
         let data = initial.data().to_vec();
-        self.transfer = Some(Transfer::Download { object, complete, size, data, toggle: false });
+        self.transfer = Some(ServedSdo::Download { object, complete, size, data, toggle: false });
         write(&Message::SdoResponse(Response::Download { object, complete }))
     }
 
@@ -162,7 +162,7 @@ impl CoeServer {
         dictionary: &mut Dictionary,
         state: AlState,
     ) -> Vec<u8> {
-        let Some(Transfer::Download { object, complete, size, mut data, toggle }) =
+        let Some(ServedSdo::Download { object, complete, size, mut data, toggle }) =
             self.transfer.take()
         else {
             return abort(ObjectAddress::new(0, 0), SdoAbortCode::COMMAND_SPECIFIER);
@@ -183,7 +183,7 @@ impl CoeServer {
             }
         } else {
             let toggle = !toggle;
-            self.transfer = Some(Transfer::Download { object, complete, size, data, toggle });
+            self.transfer = Some(ServedSdo::Download { object, complete, size, data, toggle });
         }
         write(&Message::SdoResponse(Response::DownloadSegment { toggle }))
     }

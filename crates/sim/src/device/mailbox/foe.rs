@@ -28,11 +28,11 @@ pub(super) struct MessageLimits {
 /// The server.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub(super) struct FoeServer {
-    transfer: Option<Transfer>,
+    transfer: Option<FoeTransfer>,
 }
 
 #[derive(Clone, PartialEq, Eq, Debug)]
-enum Transfer {
+enum FoeTransfer {
     /// The MainDevice reads: packet `packet` is out, from byte `at` on, and waits for its
     /// acknowledgement.
     Read { data: Vec<u8>, packet: u32, at: usize },
@@ -71,7 +71,8 @@ impl FoeServer {
                 match files.begin_write(name, password, state) {
                     Ok(target) => {
                         let data = Vec::new();
-                        self.transfer = Some(Transfer::Write { target, data, next: 1, began: now });
+                        self.transfer =
+                            Some(FoeTransfer::Write { target, data, next: 1, began: now });
                         vec![write(&Message::Ack { packet: 0 }, limits)]
                     }
                     Err(code) => refuse(code, code.text(), limits),
@@ -81,7 +82,7 @@ impl FoeServer {
             Message::Ack { packet } => self.go_on(packet, limits),
             // The MainDevice has no time for the packet: it gets it again.
             Message::Busy { .. } => match self.transfer.take() {
-                Some(Transfer::Read { data, packet, at }) => self.send(data, packet, at, limits),
+                Some(FoeTransfer::Read { data, packet, at }) => self.send(data, packet, at, limits),
                 other => {
                     self.transfer = other;
                     Vec::new()
@@ -99,13 +100,13 @@ impl FoeServer {
         let rest = data.get(at..).unwrap_or_default();
         let chunk = rest.get(..chunk_len(limits.answers)).unwrap_or(rest);
         let answer = write(&Message::Data { packet, data: chunk }, limits);
-        self.transfer = Some(Transfer::Read { data, packet, at });
+        self.transfer = Some(FoeTransfer::Read { data, packet, at });
         vec![answer]
     }
 
     /// A packet has been acknowledged: the next, if there is one.
     fn go_on(&mut self, acknowledged: u32, limits: MessageLimits) -> Answers {
-        let Some(Transfer::Read { data, packet, at }) = self.transfer.take() else {
+        let Some(FoeTransfer::Read { data, packet, at }) = self.transfer.take() else {
             self.transfer = None;
             return refuse(FoeErrorCode::ILLEGAL, "nothing is being read", limits);
         };
@@ -129,7 +130,8 @@ impl FoeServer {
         now: Instant,
         limits: MessageLimits,
     ) -> Answers {
-        let Some(Transfer::Write { target, mut data, next, began }) = self.transfer.take() else {
+        let Some(FoeTransfer::Write { target, mut data, next, began }) = self.transfer.take()
+        else {
             return refuse(FoeErrorCode::ILLEGAL, "nothing is being written", limits);
         };
         if packet != next {
@@ -138,7 +140,7 @@ impl FoeServer {
         let elapsed = now.since(began);
         if target.is_firmware() && elapsed < ERASE {
             let done = (elapsed.as_nanos() * 100 / ERASE.as_nanos()) as u16;
-            self.transfer = Some(Transfer::Write { target, data, next, began });
+            self.transfer = Some(FoeTransfer::Write { target, data, next, began });
             return vec![write(&Message::Busy { done, total: 100, text: ERASING }, limits)];
         }
         data.extend_from_slice(new);
@@ -152,7 +154,7 @@ impl FoeServer {
             }
         } else {
             let next = next.wrapping_add(1);
-            self.transfer = Some(Transfer::Write { target, data, next, began });
+            self.transfer = Some(FoeTransfer::Write { target, data, next, began });
         }
         vec![write(&Message::Ack { packet }, limits)]
     }

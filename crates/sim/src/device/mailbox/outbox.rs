@@ -31,7 +31,7 @@ impl Envelope {
 }
 
 #[derive(Clone, PartialEq, Eq, Debug)]
-struct Waiting {
+struct QueuedMessage {
     envelope: Envelope,
     kind: MailboxType,
     body: Vec<u8>,
@@ -40,7 +40,7 @@ struct Waiting {
 /// The queue of messages to the MainDevice.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub(super) struct Outbox {
-    waiting: VecDeque<Waiting>,
+    waiting: VecDeque<QueuedMessage>,
     sent: Counter,
     /// The last message in SyncManager 1, in case it is lost.
     last: Vec<u8>,
@@ -59,9 +59,9 @@ impl Outbox {
 
     /// Queues a message behind all of its own and of higher priority.
     pub(super) fn push(&mut self, kind: MailboxType, envelope: Envelope, body: Vec<u8>) {
-        let before = |waiting: &Waiting| waiting.envelope.priority >= envelope.priority;
+        let before = |waiting: &QueuedMessage| waiting.envelope.priority >= envelope.priority;
         let at = self.waiting.iter().rposition(before).map_or(0, |at| at + 1);
-        self.waiting.insert(at, Waiting { envelope, kind, body });
+        self.waiting.insert(at, QueuedMessage { envelope, kind, body });
     }
 
     /// Puts the next message into SyncManager 1, if that is empty. One that does not fit into it is

@@ -35,10 +35,10 @@ impl ProcessBuffer {
 
 /// All process data as they are set up.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
-pub(super) struct Areas(Vec<Area>);
+pub(super) struct Areas(Vec<BufferArea>);
 
 #[derive(Clone, PartialEq, Eq, Debug)]
-struct Area {
+struct BufferArea {
     buffer: ProcessBuffer,
     image: ProcessImage,
 }
@@ -61,7 +61,7 @@ impl Areas {
                     return Err(code);
                 }
                 let image = ProcessImage::of(dictionary, buffer.assignment()).map_err(|_| code)?;
-                areas.push(Area { buffer: *buffer, image });
+                areas.push(BufferArea { buffer: *buffer, image });
             }
         }
         Ok(Self(areas))

@@ -6,7 +6,7 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Instant;
 
 use super::synchronisation::Flow;
-use super::{Outcome, Processor, Step};
+use super::{Processor, RequestedStep, StepOutcome};
 use crate::controller::{Pdi, SyncSignal};
 use crate::device::application_layer::ApplicationLayer;
 
@@ -75,11 +75,11 @@ impl Processor {
     }
 
     /// Whether the clock lets it go to OP.
-    pub(super) fn wait_for_clock(&self, step: Step, now: Instant) -> Option<Outcome> {
+    pub(super) fn wait_for_clock(&self, step: RequestedStep, now: Instant) -> Option<StepOutcome> {
         match self.synchronisation.readiness(self.has_outputs()) {
             Ok(()) => None,
-            Err(_) if now < step.deadline => Some(Outcome::Waits),
-            Err(code) => Some(Outcome::Failed(AlState::SafeOp, code)),
+            Err(_) if now < step.deadline => Some(StepOutcome::Waits),
+            Err(code) => Some(StepOutcome::Failed(AlState::SafeOp, code)),
         }
     }
 }

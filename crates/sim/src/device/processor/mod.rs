@@ -115,7 +115,7 @@ pub struct Processor {
     process_data: Areas,
     synchronisation: Synchronisation,
     /// The step that is being worked on.
-    step: Option<Step>,
+    step: Option<RequestedStep>,
     next_sample: Instant,
     files: Files,
     history: History,
@@ -135,7 +135,7 @@ pub struct Processor {
 
 /// A requested state on its way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Step {
+struct RequestedStep {
     to: AlState,
     /// When the checks are done.
     due: Instant,
@@ -144,7 +144,7 @@ struct Step {
 }
 
 /// What became of a step.
-enum Outcome {
+enum StepOutcome {
     Entered,
     Failed(AlState, AlStatusCode),
     Waits,
@@ -207,9 +207,9 @@ impl Processor {
         if let Some(step) = self.step.filter(|step| step.due <= now) {
             self.step = None;
             match self.go(step, now, pdi) {
-                Outcome::Entered => self.application_layer.enter(pdi, step.to),
-                Outcome::Failed(state, code) => self.fall(pdi, state, code),
-                Outcome::Waits => self.step = Some(step),
+                StepOutcome::Entered => self.application_layer.enter(pdi, step.to),
+                StepOutcome::Failed(state, code) => self.fall(pdi, state, code),
+                StepOutcome::Waits => self.step = Some(step),
             }
         }
         // While it waits for outputs it listens, while it works it does not.
@@ -219,7 +219,8 @@ impl Processor {
             // Whoever asks has seen the error, if there was one: outputs may come again.
             self.lock_outputs(pdi, false);
             let due = now + self.time_for(from, to);
-            self.step = Some(Step { to, due, deadline: due + self.description.times.outputs });
+            self.step =
+                Some(RequestedStep { to, due, deadline: due + self.description.times.outputs });
         }
     }
 
@@ -238,7 +239,7 @@ impl Processor {
     }
 
     /// Tries to enter the state of a step.
-    fn go(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
+    fn go(&mut self, step: RequestedStep, now: Instant, pdi: &mut Pdi<'_>) -> StepOutcome {
         let from = ApplicationLayer::state(pdi);
         if !step.to.has_outputs() {
             self.make_safe(pdi);
@@ -246,31 +247,31 @@ impl Processor {
         match step.to {
             AlState::Init => {
                 self.mailbox.restart();
-                if from == AlState::Boot { self.leave_boot(pdi) } else { Outcome::Entered }
+                if from == AlState::Boot { self.leave_boot(pdi) } else { StepOutcome::Entered }
             }
             AlState::PreOp => self.start_mailbox(from, pdi, AlStatusCode::INVALID_MAILBOX_PREOP),
             AlState::Boot => self.start_mailbox(from, pdi, AlStatusCode::INVALID_MAILBOX_BOOT),
             AlState::SafeOp => match self.set_up_process_data(pdi) {
                 Ok(()) => {
                     self.sample_inputs(now, pdi);
-                    Outcome::Entered
+                    StepOutcome::Entered
                 }
-                Err(code) => Outcome::Failed(AlState::PreOp, code),
+                Err(code) => StepOutcome::Failed(AlState::PreOp, code),
             },
             AlState::Op => self.go_operational(step, now, pdi),
         }
     }
 
-    fn start_mailbox(&mut self, from: AlState, pdi: &Pdi<'_>, code: AlStatusCode) -> Outcome {
+    fn start_mailbox(&mut self, from: AlState, pdi: &Pdi<'_>, code: AlStatusCode) -> StepOutcome {
         if !pdi.sii_load_ok() {
-            return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
+            return StepOutcome::Failed(AlState::Init, AlStatusCode::EEPROM_ERROR);
         }
         // The MainDevice has to leave the EEPROM to it: bit 0 of 0x0500.
         if self.reads_sii && pdi.register(r::SII_ACCESS_ECAT.address) & 1 == 0 {
-            return Outcome::Failed(AlState::Init, AlStatusCode::EEPROM_NO_ACCESS);
+            return StepOutcome::Failed(AlState::Init, AlStatusCode::EEPROM_NO_ACCESS);
         }
         if let Err(code) = self.check_mailbox(pdi, code) {
-            return Outcome::Failed(AlState::Init, code);
+            return StepOutcome::Failed(AlState::Init, code);
         }
         if !from.has_mailbox() {
             self.mailbox.restart();
@@ -278,7 +279,7 @@ impl Processor {
                 self.note_communication(pdi);
             }
         }
-        Outcome::Entered
+        StepOutcome::Entered
     }
 
     /// Whether the mailbox is set up as the device wants it, if it has one; `wrong` is the code for
@@ -341,31 +342,36 @@ impl Processor {
         }
     }
 
-    fn go_operational(&mut self, step: Step, now: Instant, pdi: &mut Pdi<'_>) -> Outcome {
+    fn go_operational(
+        &mut self,
+        step: RequestedStep,
+        now: Instant,
+        pdi: &mut Pdi<'_>,
+    ) -> StepOutcome {
         if let Err(code) = self.check_process_data(pdi) {
-            return Outcome::Failed(AlState::PreOp, code);
+            return StepOutcome::Failed(AlState::PreOp, code);
         }
         // What stood still when it entered SAFEOP may run by now.
         if !self.has_values {
             self.sample_inputs(now, pdi);
         }
         if let Some(code) = self.values_missing() {
-            return Outcome::Failed(AlState::SafeOp, code);
+            return StepOutcome::Failed(AlState::SafeOp, code);
         }
         if let Some(outcome) = self.wait_for_clock(step, now) {
             return outcome;
         }
         if !self.has_outputs() {
-            return Outcome::Entered;
+            return StepOutcome::Entered;
         }
         if self.take_outputs(pdi) && !self.watchdog_ran_out(pdi) {
             self.drive_outputs(now, pdi.signals_mut());
-            return Outcome::Entered;
+            return StepOutcome::Entered;
         }
         if now < step.deadline {
-            return Outcome::Waits;
+            return StepOutcome::Waits;
         }
-        Outcome::Failed(AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG)
+        StepOutcome::Failed(AlState::SafeOp, AlStatusCode::SYNC_MANAGER_WATCHDOG)
     }
 
     /// The code to show when an application that has not run since the start gives no values to

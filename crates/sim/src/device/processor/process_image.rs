@@ -10,12 +10,12 @@ use crate::device::dictionary::{Dictionary, EntryRef};
 /// The process data of one direction.
 #[derive(Clone, PartialEq, Eq, Default, Debug)]
 pub(super) struct ProcessImage {
-    slots: Vec<Slot>,
+    slots: Vec<ImageSlot>,
     bits: usize,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-struct Slot {
+struct ImageSlot {
     /// `None` for padding.
     entry: Option<EntryRef>,
     bits: usize,
@@ -53,7 +53,7 @@ impl ProcessImage {
             }
         };
         let bits = usize::from(bits);
-        self.slots.push(Slot { entry, bits });
+        self.slots.push(ImageSlot { entry, bits });
         self.bits += bits;
         Ok(())
     }

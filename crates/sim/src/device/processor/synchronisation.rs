@@ -62,7 +62,7 @@ const MEASURES: u64 = 1 << 14;
 
 /// What the device keeps step with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Mode {
+enum SyncMode {
     /// Its own timer.
     FreeRun,
     /// The frames that bring outputs or fetch inputs.
@@ -73,7 +73,7 @@ enum Mode {
 
 /// What a type needs for its work, in ns.
 #[derive(Clone, Copy, Default, Debug)]
-struct Needs {
+struct SyncNeeds {
     /// For everything it does in a cycle.
     cycle: u64,
     /// For getting outputs ready.
@@ -96,8 +96,8 @@ pub(super) struct Flow {
 /// The state of it.
 #[derive(Debug)]
 pub(super) struct Synchronisation {
-    needs: Needs,
-    mode: Mode,
+    needs: SyncNeeds,
+    mode: SyncMode,
     /// From one pulse to the next.
     cycle: Span,
     /// What it wrote into the cycle time itself.
@@ -154,14 +154,14 @@ impl Synchronisation {
         let most = |subindex| {
             get(fresh, OUTPUTS, subindex).max(get(fresh, INPUTS, subindex)).min(1_000_000_000)
         };
-        let needs = Needs {
+        let needs = SyncNeeds {
             cycle: most(sub::SHORTEST_CYCLE),
             calc_and_copy: most(sub::CALC_AND_COPY),
             delay: most(sub::DELAY),
         };
         Self {
             needs,
-            mode: Mode::Frames,
+            mode: SyncMode::Frames,
             cycle: Span::ZERO,
             shown_cycle: 0,
             default_cycles: [OUTPUTS, INPUTS].map(|index| get(fresh, index, sub::CYCLE)),
@@ -221,8 +221,8 @@ impl Synchronisation {
             if has(dictionary, leads) { get(dictionary, leads, sub::SUPPORTED) } else { u64::MAX };
         let mode = mode(wanted, supported, activation)?;
         let cycle = match mode {
-            Mode::FreeRun | Mode::Frames => 0,
-            Mode::Clock(signal) => self.check_cycle(dictionary, leads, signal, pdi)?,
+            SyncMode::FreeRun | SyncMode::Frames => 0,
+            SyncMode::Clock(signal) => self.check_cycle(dictionary, leads, signal, pdi)?,
         };
         *self = Self {
             needs: self.needs,
@@ -232,7 +232,7 @@ impl Synchronisation {
             cycle: Span::ns(cycle),
             ..Self::new(dictionary)
         };
-        if let Mode::Clock(signal) = mode {
+        if let SyncMode::Clock(signal) = mode {
             let number = match signal {
                 SyncSignal::Sync0 => 2,
                 SyncSignal::Sync1 => 3,
@@ -284,7 +284,7 @@ impl Synchronisation {
 
     /// Whether the clock can be trusted; if not, the code to show should that not change.
     pub(super) fn readiness(&self, outputs: bool) -> Result<(), AlStatusCode> {
-        let Mode::Clock(_) = self.mode else { return Ok(()) };
+        let SyncMode::Clock(_) = self.mode else { return Ok(()) };
         if self.strays > MISS * STRAYS {
             Err(AlStatusCode::DC_SYNC_IO_ERROR)
         } else if self.in_time < LOCKED {
@@ -300,12 +300,12 @@ impl Synchronisation {
 
     /// Whether a signal of the clock is what the device keeps step with.
     pub(super) fn follows(&self, signal: SyncSignal) -> bool {
-        self.mode == Mode::Clock(signal)
+        self.mode == SyncMode::Clock(signal)
     }
 
     /// Whether inputs are taken with the frames.
     pub(super) fn samples_with_frames(&self) -> bool {
-        !matches!(self.mode, Mode::Clock(_))
+        !matches!(self.mode, SyncMode::Clock(_))
     }
 
     // ---- what happens ----
@@ -315,22 +315,22 @@ impl Synchronisation {
         let now = pdi.now();
         self.ever_arrived = true;
         match self.mode {
-            Mode::Clock(_) => {
+            SyncMode::Clock(_) => {
                 self.arrived = Some(now);
                 false
             }
-            Mode::FreeRun => {
+            SyncMode::FreeRun => {
                 let set = get(dictionary, OUTPUTS, sub::CYCLE);
                 let timer = if set == 0 { OWN_CYCLE.as_nanos() } else { set };
                 self.drive_at = Some(now + Span::ns(timer - pdi.local_time() % timer));
                 false
             }
-            Mode::Frames if now < self.busy_until => {
+            SyncMode::Frames if now < self.busy_until => {
                 count(dictionary, OUTPUTS, sub::CYCLE_EXCEEDED);
                 self.drive_at = Some(self.busy_until);
                 false
             }
-            Mode::Frames => {
+            SyncMode::Frames => {
                 self.busy_until = now + self.takes();
                 self.measure(dictionary);
                 true
@@ -427,7 +427,7 @@ impl Synchronisation {
     pub(super) fn take_due(&mut self, now: Instant) -> (bool, bool) {
         let take = |at: &mut Option<Instant>| at.take_if(|at| *at <= now).is_some();
         let drive = take(&mut self.drive_at);
-        if drive && self.mode == Mode::Frames {
+        if drive && self.mode == SyncMode::Frames {
             self.busy_until = now + self.takes();
         }
         (drive, take(&mut self.sample_at))
@@ -439,7 +439,7 @@ impl Synchronisation {
     }
 
     fn silent_at(&self) -> Option<Instant> {
-        let Mode::Clock(_) = self.mode else { return None };
+        let SyncMode::Clock(_) = self.mode else { return None };
         let patience = self.cycle.as_nanos() * SILENT_CYCLES + self.cycle.as_nanos() / 2;
         self.last_pulse.map(|last| last + Span::ns(patience))
     }
@@ -452,7 +452,7 @@ impl Synchronisation {
 }
 
 /// The mode that follows from what is wanted (0x1C3x:01), supported (04) and switched on (0x0981).
-fn mode(wanted: u64, supported: u64, activation: u8) -> Result<Mode, AlStatusCode> {
+fn mode(wanted: u64, supported: u64, activation: u8) -> Result<SyncMode, AlStatusCode> {
     const UNIT: u8 = 1 << 0;
     const SYNC0: u8 = 1 << 1;
     const SYNC1: u8 = 1 << 2;
@@ -463,16 +463,16 @@ fn mode(wanted: u64, supported: u64, activation: u8) -> Result<Mode, AlStatusCod
             return Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION);
         }
         return match (wanted, activation & SYNC1 != 0) {
-            (WANTS_SYNC1, true) => Ok(Mode::Clock(SyncSignal::Sync1)),
+            (WANTS_SYNC1, true) => Ok(SyncMode::Clock(SyncSignal::Sync1)),
             (WANTS_SYNC1, false) => Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION),
-            _ => Ok(Mode::Clock(SyncSignal::Sync0)),
+            _ => Ok(SyncMode::Clock(SyncSignal::Sync0)),
         };
     }
     match wanted {
         0 if supported & FREE_RUN == 0 => Err(AlStatusCode::FREE_RUN_NOT_SUPPORTED),
-        0 => Ok(Mode::FreeRun),
+        0 => Ok(SyncMode::FreeRun),
         1 | 0x22 if supported & WITH_FRAMES == 0 => Err(AlStatusCode::SYNC_NOT_SUPPORTED),
-        1 | 0x22 => Ok(Mode::Frames),
+        1 | 0x22 => Ok(SyncMode::Frames),
         2 | 3 => Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION),
         _ => Err(AlStatusCode::SYNC_NOT_SUPPORTED),
     }
@@ -486,15 +486,15 @@ mod tests {
     #[test]
     fn the_mode_follows_from_objects_and_unit() {
         let all = FREE_RUN | WITH_FRAMES | WITH_CLOCK;
-        let sync0 = Mode::Clock(SyncSignal::Sync0);
+        let sync0 = SyncMode::Clock(SyncSignal::Sync0);
         // wanted, supported, activation, mode or code
         let table = [
-            (0, all, 0x00, Ok(Mode::FreeRun)),
-            (1, all, 0x00, Ok(Mode::Frames)),
-            (0x22, all, 0x00, Ok(Mode::Frames)),
+            (0, all, 0x00, Ok(SyncMode::FreeRun)),
+            (1, all, 0x00, Ok(SyncMode::Frames)),
+            (0x22, all, 0x00, Ok(SyncMode::Frames)),
             (1, all, 0x03, Ok(sync0)),
             (2, all, 0x03, Ok(sync0)),
-            (3, all, 0x07, Ok(Mode::Clock(SyncSignal::Sync1))),
+            (3, all, 0x07, Ok(SyncMode::Clock(SyncSignal::Sync1))),
             (2, all, 0x00, Err(0x0030)),
             (3, all, 0x03, Err(0x0030)),
             (1, all, 0x01, Err(0x0030)),

@@ -5,18 +5,18 @@
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use linesman_proto::state::{AlState, AlStatusCode};
 
-use super::{Outcome, Processor};
+use super::{Processor, StepOutcome};
 use crate::controller::Pdi;
 use crate::device::history::History;
 
 impl Processor {
     /// On the way out of BOOT new firmware starts. An update that broke off leaves the old one.
-    pub(super) fn leave_boot(&mut self, pdi: &mut Pdi<'_>) -> Outcome {
+    pub(super) fn leave_boot(&mut self, pdi: &mut Pdi<'_>) -> StepOutcome {
         if self.files.take_broken_update() {
-            return Outcome::Failed(AlState::Init, AlStatusCode::FIRMWARE_UPDATE_FAILED);
+            return StepOutcome::Failed(AlState::Init, AlStatusCode::FIRMWARE_UPDATE_FAILED);
         }
         self.start_new_firmware(pdi);
-        Outcome::Entered
+        StepOutcome::Entered
     }
 
     /// The processor starts, with new firmware if some waits.

@@ -2,43 +2,43 @@
 
 use linesman_proto::time::Span;
 
-use crate::device::application::Value;
+use crate::device::application::ChannelValue;
 use crate::device::application::motion::Limits;
 use crate::device::dictionary::Dictionary;
 
 /// Where they are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Objects {
-    pub(super) controlword: Value,
-    pub(super) statusword: Value,
-    quick_stop: Value,
-    pub(super) mode: Value,
-    pub(super) mode_display: Value,
-    pub(super) position: Value,
-    pub(super) demand: Value,
-    pub(super) velocity: Value,
-    pub(super) following_error: Value,
-    pub(super) window: Value,
-    pub(super) window_time: Value,
-    position_window: Value,
-    pub(super) target_position: Value,
-    pub(super) target_velocity: Value,
-    pub(super) home_offset: Value,
-    pub(super) homing_method: Value,
-    maximal_velocity: Value,
-    maximal_acceleration: Value,
-    pub(super) profile_velocity: Value,
-    pub(super) acceleration: Value,
-    pub(super) deceleration: Value,
-    pub(super) quick_stop_deceleration: Value,
-    pub(super) digital_inputs: Value,
-    pub(super) error_code: Value,
-    interpolation: [Value; 2],
+    pub(super) controlword: ChannelValue,
+    pub(super) statusword: ChannelValue,
+    quick_stop: ChannelValue,
+    pub(super) mode: ChannelValue,
+    pub(super) mode_display: ChannelValue,
+    pub(super) position: ChannelValue,
+    pub(super) demand: ChannelValue,
+    pub(super) velocity: ChannelValue,
+    pub(super) following_error: ChannelValue,
+    pub(super) window: ChannelValue,
+    pub(super) window_time: ChannelValue,
+    position_window: ChannelValue,
+    pub(super) target_position: ChannelValue,
+    pub(super) target_velocity: ChannelValue,
+    pub(super) home_offset: ChannelValue,
+    pub(super) homing_method: ChannelValue,
+    maximal_velocity: ChannelValue,
+    maximal_acceleration: ChannelValue,
+    pub(super) profile_velocity: ChannelValue,
+    pub(super) acceleration: ChannelValue,
+    pub(super) deceleration: ChannelValue,
+    pub(super) quick_stop_deceleration: ChannelValue,
+    pub(super) digital_inputs: ChannelValue,
+    pub(super) error_code: ChannelValue,
+    interpolation: [ChannelValue; 2],
 }
 
 impl Objects {
     pub(super) fn of(dictionary: &Dictionary) -> Self {
-        let value = |index| Value::of(dictionary, index, 0);
+        let value = |index| ChannelValue::of(dictionary, index, 0);
         Self {
             controlword: value(0x6040),
             statusword: value(0x6041),
@@ -64,7 +64,7 @@ impl Objects {
             digital_inputs: value(0x60FD),
             target_velocity: value(0x60FF),
             error_code: value(0x603F),
-            interpolation: [1, 2].map(|subindex| Value::of(dictionary, 0x60C2, subindex)),
+            interpolation: [1, 2].map(|subindex| ChannelValue::of(dictionary, 0x60C2, subindex)),
         }
     }
 
@@ -95,7 +95,7 @@ impl Objects {
     }
 }
 
-impl Value {
+impl ChannelValue {
     /// A number without a sign.
     pub(super) fn unsigned(self, dictionary: &Dictionary) -> f64 {
         self.get(dictionary) as u32 as f64

@@ -1,0 +1,251 @@
+//! `linesman capture info`: what the network is, from frames alone.
+
+use std::fs;
+use std::path::Path;
+
+use crate::captures::captures;
+use crate::support::capture::Pcap;
+use crate::support::{assert_valid, linesman};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// The JSON of a capture, held against its schema.
+pub(crate) fn info(path: &Path) -> Value {
+    let run = linesman(["capture", "info", path.to_str().unwrap(), "--json"]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    let value = run.json();
+    assert_valid(&value, "capture");
+    value
+}
+
+/// The published frame of 516 bytes: command, the two words of its address as sent, length, working counter.
+const SEVEN: [(u8, u16, u16, u16, u16); 7] = [
+    (0, 0, 0x0900, 4, 0),
+    (13, 0xFFED, 0x0910, 4, 46),
+    (10, 0, 0x0900, 3, 18),
+    (12, 0, 0x0100, 150, 21),
+    (11, 0x0800, 0x0100, 33, 17),
+    (10, 0x1000, 0x0100, 220, 19),
+    (7, 0, 0x0130, 2, 46),
+];
+
+/// The frame on its way out, or back.
+fn seven(is_back: bool) -> Vec<u8> {
+    let source = if is_back { 2 } else { 0 };
+    let mut bytes = vec![0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, source, 1, 5, 1, 0, 0, 0x88, 0xA4];
+    bytes.extend([0xF4, 0x11]);
+    for (number, (command, adp, ado, len, wkc)) in (0_u8..).zip(SEVEN) {
+        let more = if number == 6 { 0 } else { 0x8000_u16 };
+        let passed = if is_back && matches!(command, 7 | 13) { 46 } else { 0 };
+        bytes.extend([command, 0xB0 + number]);
+        bytes.extend(adp.wrapping_add(passed).to_le_bytes());
+        bytes.extend(ado.to_le_bytes());
+        bytes.extend((len | more).to_le_bytes());
+        bytes.extend([0, 0]);
+        let state = is_back && command == 7;
+        bytes.extend((0..len).map(|at| if state && at == 0 { 8 } else { 0 }));
+        bytes.extend(if is_back { wkc } else { 0 }.to_le_bytes());
+    }
+    assert_eq!(bytes.len(), 516);
+    bytes
+}
+
+fn file(folder: &TempDir, capture: Pcap) -> std::path::PathBuf {
+    let path = folder.path().join("made.pcap");
+    fs::write(&path, capture.0).unwrap();
+    path
+}
+
+/// What the published frame says of its network.
+fn assert_published(info: &Value) {
+    assert_eq!(info["network"]["devices"], 46, "{info}");
+    assert_eq!(info["network"]["reference_clock"]["no"], 20, "{info}");
+    assert_eq!(info["network"]["reference_clock"]["takes_part"], 46);
+    assert_eq!(info["network"]["mailboxes"], json!({ "count": 18, "by": "status-bits" }));
+    let frame = &info["cyclic"][0];
+    assert_eq!((&frame["bytes"], &frame["data_bytes"]), (&json!(516), &json!(416)));
+    let wkc: Vec<u64> = frame["datagrams"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| one["working_counters"][0]["value"].as_u64().unwrap())
+        .collect();
+    assert_eq!(wkc, [0, 46, 18, 21, 17, 19, 46]);
+}
+
+// S0 L2696-2757: frames 3 µs apart out and back, 2 ms from one to the next; 46 SubDevices, the twentieth has the
+// reference clock, 18 have a mailbox.
+// proves: WS-05, WS-04
+#[test]
+fn published_frames_name_46_subdevices_the_clock_and_18_mailboxes() {
+    let folder = TempDir::new().unwrap();
+    let mut capture = Pcap::new();
+    for cycle in 0..40 {
+        capture.frame(cycle * 1_992, &seven(false));
+        capture.frame(cycle * 1_992 + 3, &seven(true));
+    }
+    let path = file(&folder, capture);
+    let whole = info(&path);
+    assert_published(&whole);
+    assert_eq!(whole["recording"]["ways"], "both");
+    assert_eq!(whole["recording"]["began_in_run"], true);
+    let frame = &whole["cyclic"][0];
+    assert_eq!((&frame["cycle_ns"], &frame["task"]), (&json!(1_992_000), &json!(1)));
+    assert_eq!(frame["response"]["median_ns"], 3_000);
+    // 516 bytes take 43.2 µs of 1.992 ms.
+    assert_eq!((&frame["wire_ns"], &frame["load_percent"]), (&json!(43_200), &json!(2.17)));
+    assert_eq!(
+        (&frame["missing"], &frame["off"], &frame["lost"]),
+        (&json!(0), &json!(0), &json!(0))
+    );
+    let text = linesman(["capture", "info", path.to_str().unwrap()]);
+    for words in ["46 SubDevices, 18 mailboxes", "SubDevice 20 is the reference clock", "516"] {
+        assert!(text.stdout.contains(words), "{words}: {}", text.stdout);
+    }
+}
+
+// proves: WS-05
+#[test]
+fn single_published_frame_and_returns_alone_name_the_same() {
+    let folder = TempDir::new().unwrap();
+    let mut capture = Pcap::new();
+    capture.frame(0, &seven(false));
+    capture.frame(3, &seven(true));
+    let single = info(&file(&folder, capture));
+    assert_published(&single);
+    assert_eq!(single["cyclic"][0]["cycle_ns"], Value::Null, "one frame has no cycle");
+    let mut capture = Pcap::new();
+    for cycle in 0..40 {
+        capture.frame(cycle * 2_000, &seven(true));
+    }
+    let returns = info(&file(&folder, capture));
+    assert_published(&returns);
+    assert_eq!(returns["recording"]["ways"], "returns");
+    assert_eq!(returns["timing"]["response"], Value::Null);
+    let unknown = returns["unknown"].to_string();
+    assert!(unknown.contains("no requests"), "{unknown}");
+}
+
+#[test]
+fn start_up_of_a_coupler_with_an_analogue_terminal_is_told_in_full() {
+    let Some(directory) = captures() else { return };
+    let info = info(&directory.join("ec-replay-ek1914-el3004-mailbox.pcapng"));
+    let terminal = &info["devices"][1];
+    assert_eq!((&terminal["type"], &terminal["station"]), (&json!("EL3004"), &json!(0x1001)));
+    assert_eq!(
+        (&terminal["product_code"], &terminal["state"]),
+        (&json!(0x0BBC_3052), &json!("PREOP"))
+    );
+    let managers = terminal["sync_managers"].as_array().unwrap();
+    let modes: Vec<&str> = managers.iter().map(|one| one["mode"].as_str().unwrap()).collect();
+    assert_eq!(modes[..2], ["mailbox", "mailbox"]);
+    assert_eq!((&managers[0]["start"], &managers[0]["length"]), (&json!(0x1000), &json!(128)));
+    let transfers = info["transfers"].as_array().unwrap();
+    let told: Vec<_> = transfers
+        .iter()
+        .map(|one| {
+            (
+                one["what"].as_str().unwrap(),
+                one["index"].as_u64().unwrap(),
+                one["data"].as_str().unwrap(),
+            )
+        })
+        .collect();
+    let expected = [
+        ("upload", 0x100A, "3038"),
+        ("download", 0xF008, "01000000"),
+        ("upload", 0xF008, "01000000"),
+    ];
+    assert_eq!(told, expected);
+    let links = info["links"].as_array().unwrap();
+    assert_eq!(links[1], json!({ "a": { "no": 1, "port": "B" }, "b": { "no": 2, "port": "A" } }));
+    assert_eq!(info["network"]["mailboxes"], json!({ "count": 2, "by": "sync-managers" }));
+}
+
+#[test]
+fn type_of_a_subdevice_is_taken_from_a_device_description() {
+    let Some(directory) = captures() else { return };
+    let path = directory.join("ec-replay-ek1100-el2828-el2889.pcapng");
+    let folder = TempDir::new().unwrap();
+    let esi = folder.path().join("esi.xml");
+    fs::write(
+        &esi,
+        "<EtherCATInfo><Vendor><Id>2</Id><Name>V</Name></Vendor><Descriptions><Groups/><Devices><Device>\
+         <Type ProductCode=\"#x0b0c3052\" RevisionNo=\"#x00110000\">EL2828-described</Type></Device></Devices>\
+         </Descriptions></EtherCATInfo>",
+    )
+    .unwrap();
+    let run = linesman([
+        "capture",
+        "info",
+        path.to_str().unwrap(),
+        "--esi",
+        esi.to_str().unwrap(),
+        "--json",
+    ]);
+    let devices = run.json()["devices"].clone();
+    assert_eq!(devices[1]["described_as"], "EL2828-described", "{}", run.all());
+    assert_eq!(devices[0]["described_as"], Value::Null);
+    let missing = linesman(["capture", "info", path.to_str().unwrap(), "--esi", "nowhere"]);
+    assert_eq!(missing.status, 2);
+    assert!(missing.stderr.contains("nowhere"), "{}", missing.stderr);
+}
+
+#[test]
+fn line_that_nobody_answers_on_is_told_without_claims() {
+    let Some(directory) = captures() else { return };
+    let info = info(&directory.join("ec-soem-sdinfo-no-slaves.pcapng"));
+    assert_eq!(
+        (&info["network"]["devices"], &info["recording"]["ways"]),
+        (&json!(0), &json!("requests"))
+    );
+    assert_eq!((&info["devices"], &info["network"]["reference_clock"]), (&json!([]), &Value::Null));
+    let asked = info["states"].as_array().unwrap();
+    assert!(asked.iter().all(|one| one["what"] == "asked" && one["wkc"].is_null()), "{asked:?}");
+    assert!(info["unknown"].to_string().contains("no returns"));
+}
+
+#[test]
+fn what_is_no_capture_is_refused_with_the_next_step() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("notes.txt");
+    fs::write(&path, "slave 1 OP\n").unwrap();
+    let text = linesman(["capture", "info", path.to_str().unwrap()]);
+    assert_eq!(text.status, 2, "{}", text.all());
+    assert!(text.stderr.contains("expected a capture"), "{}", text.stderr);
+    let card = linesman(["capture", "info", "eth0"]);
+    assert_eq!(card.status, 2);
+    let json = linesman(["capture", "info", "missing.pcapng", "--json"]);
+    assert_eq!((json.status, &json.json()["schema"]), (2, &json!("linesman.error/1")));
+}
+
+// S0 L2646-2692.
+// proves: WS-01, WS-02, WS-03
+#[test]
+fn guide_names_the_capture_last_the_probe_and_three_set_ups_with_their_limits() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/guide/capture.md");
+    let page = fs::read_to_string(path).unwrap();
+    let steps = [
+        "1. Look at the line: `linesman diagnose listen:",
+        "2. Look at this computer",
+        "3. Take a capture",
+    ];
+    let places: Vec<usize> = steps.iter().map(|step| page.find(step).unwrap()).collect();
+    assert!(places.is_sorted(), "the capture comes last: {places:?}");
+    for figure in [
+        "eight ports",
+        "four channels",
+        "less than 1 µs",
+        "resolution of 1 ns",
+        "accuracy of 40 ns",
+        "24 V",
+    ] {
+        assert!(page.contains(figure), "{figure}");
+    }
+    let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| ")).collect();
+    assert_eq!(rows.len(), 4, "a heading and three set-ups: {rows:?}");
+    for (row, words) in rows[1..].iter().zip(["own card", "time stamps", "closed system"]) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        assert!(cells[1].contains(words) && cells[3].len() > 20, "{row}");
+    }
+}

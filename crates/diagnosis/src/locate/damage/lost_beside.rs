@@ -1,0 +1,64 @@
+//! Frames that were lost beside other damage: at moments at which no controller counted anything.
+
+use linesman_proto::register::ErrorCounter;
+use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::Route;
+
+use super::{COMING_UP, ErrorWalk, LastHop};
+use crate::locate::Intervals;
+use crate::model::CounterTrack;
+use crate::model::counters::RISES_KEPT;
+
+/// A frame that is lost was damaged so long after it was sent at most.
+const IN_FLIGHT: Span = Span::ms(10);
+
+impl ErrorWalk<'_, '_> {
+    /// Frames that were lost beside other damage: at a time at which no controller counted anything, as readings
+    /// before and after it show.
+    pub(super) fn unknown_beside(&self, route: &Route) -> Option<LastHop> {
+        let card = route.arrives_at()?;
+        let hop = *route.hops().last()?;
+        let model = self.input.model();
+        let is_watched = model.host.is_watched || model.traffic.recording.cut() > 0;
+        if self.carried.frames == 0 || !self.is_read || is_watched || model.hole.is_some() {
+            return None;
+        }
+        let counted = self.counting_times(route)?;
+        let begin = model.traffic.recording.first()?;
+        let times = model.traffic.losses.times().iter().copied();
+        let mut lost: Vec<Instant> = times
+            .filter(|at| {
+                *at >= model.spell_began && *at <= self.horizon && *at >= begin + COMING_UP
+            })
+            .filter(|at| !counted.meet((at.before(IN_FLIGHT), *at + IN_FLIGHT)))
+            .filter(|at| !self.input.any_link_changed(*at, *at))
+            .filter(|at| !model.traffic.recording.was_bad(*at, *at))
+            .collect();
+        lost.sort_unstable();
+        let (first, last) = (*lost.first()?, *lost.last()?);
+        let is_beside = true;
+        Some(LastHop::Unknown { hop, card, lost: lost.len() as u64, is_beside, first, last })
+    }
+
+    /// Times in which a controller on the way counted a bad frame or symbol: between two readings.
+    /// `None` where not all of them are kept.
+    fn counting_times(&self, route: &Route) -> Option<Intervals> {
+        let ports = route.checks().map(|check| (check.node, check.port));
+        let tracks = ports.flat_map(|(node, port)| {
+            let counters = [
+                ErrorCounter::InvalidFrame(port),
+                ErrorCounter::Forwarded(port),
+                ErrorCounter::PhysicalLayer(port),
+            ];
+            counters.into_iter().filter_map(move |counter| self.input.track(node, counter))
+        });
+        let tracks: Vec<&CounterTrack> = tracks.collect();
+        if tracks.iter().any(|track| {
+            track.rises.len() == RISES_KEPT || (track.is_at_end() && track.spell_rise() > 0)
+        }) {
+            return None;
+        }
+        let rises = tracks.into_iter().flat_map(|track| &track.rises);
+        Some(rises.map(|rise| (rise.after_time, rise.at)).collect())
+    }
+}

@@ -1,0 +1,63 @@
+//! A slice of the score: floors below which the diagnosis must not fall, and that it can be measured again.
+
+use linesman_lab::score::{Perturbation, ScoreOptions, Tally, run_case};
+
+#[test]
+fn a_slice_of_the_score_stays_above_its_floors() {
+    let options = ScoreOptions::default();
+    let mut tally = Tally::new(options);
+    for seed in 1..21 {
+        tally.add(&run_case(seed, &options));
+    }
+    let report = tally.report();
+    assert_eq!(report.cases, 20);
+    assert!(report.effective_cases >= 12, "{}", report.effective_cases);
+    assert!(report.healthy_runs >= 14, "{}", report.healthy_runs);
+    let said: Vec<String> = report.wrong.iter().map(|wrong| format!("{wrong:?}")).collect();
+    let said = said.join("\n");
+    assert_eq!(report.false_alarms, 0, "{:?}", report.healthy.alarms);
+    assert!(report.place_at_1_set >= 0.65, "{}\n{said}", report.place_at_1_set);
+    assert!(report.cause_at_1_set >= 0.55, "{}\n{said}", report.cause_at_1_set);
+    assert!(report.place_at_1_set > report.baseline.place_at_1 + 0.2, "{said}");
+}
+
+#[test]
+fn a_seed_is_judged_the_same_each_time() {
+    let options = ScoreOptions::default();
+    for seed in 1..4 {
+        let (one, again) = (run_case(seed, &options), run_case(seed, &options));
+        assert_eq!(format!("{one:?}"), format!("{again:?}"));
+    }
+}
+
+#[test]
+fn a_recording_is_judged_without_the_live_diagnosis() {
+    let options = ScoreOptions { capture_only: true, ..ScoreOptions::default() };
+    let case = run_case(4, &options);
+    assert!(case.faults.iter().all(|fault| fault.live.is_none()), "{case:?}");
+}
+
+#[test]
+fn a_healthy_line_that_is_disturbed_is_not_accused() {
+    let options = ScoreOptions { healthy: true, ..ScoreOptions::default() };
+    for seed in 1..16 {
+        let case = run_case(seed, &options);
+        assert_eq!(case.unplayable, None, "{}", case.replay());
+        let [live, recorded] = case.healthy.unwrap().map(|said| said.alarms);
+        assert!(live.is_empty() && recorded.is_empty(), "seed {seed}: {live:?} {recorded:?}");
+    }
+}
+
+#[test]
+fn a_perturbed_plant_is_judged_like_any_other() {
+    for perturb in Perturbation::ALL {
+        let options = ScoreOptions { perturb: Some(perturb), ..ScoreOptions::default() };
+        let mut tally = Tally::new(options);
+        for seed in 1..7 {
+            tally.add(&run_case(seed, &options));
+        }
+        let report = tally.report();
+        assert_eq!(report.perturbed.as_deref(), Some(perturb.name()));
+        assert!(report.effective_cases >= 3, "{perturb}: {:?}", report.unplayable);
+    }
+}
