@@ -24,6 +24,8 @@ NEAR_B, FAR_B = "veth2", "veth3"
 
 
 NUMBERS = itertools.count(1)
+# EtherCAT as it is, and in UDP.
+EVERY_FRAME = "ether proto 0x88a4 or udp port 34980"
 # The longest frame. The kernel's buffer has places of equal size: unless told, of 256 KiB each, and few of them.
 LONGEST = 1518
 
@@ -35,6 +37,9 @@ class Bench:
         number = f"{os.getpid()}-{next(NUMBERS)}"
         self.near, self.far = f"linesman-near-{number}", f"linesman-far-{number}"
         self.running = []
+        self.began = time.monotonic()
+        # Who knows when the host stood still; set by whoever runs the check.
+        self.host = None
         # What a person should know of a check that is right in the end.
         self.notes = []
         self.folder = tempfile.TemporaryDirectory(prefix="linesman-interop-")
@@ -109,6 +114,10 @@ class Bench:
         files = [f"/sys/class/net/{interface}/statistics/{one}_packets" for one in directions]
         _, out, _ = self.run(self.near, "cat", *files)
         return sum(map(int, out.split()))
+
+    def stood(self, since):
+        """How long each stall of the host since then was, in milliseconds."""
+        return self.host.stood(since) if self.host else []
 
     def sent_near(self):
         """Frames that any program has sent on the MainDevice's end so far."""
@@ -262,14 +271,14 @@ class Capture:
             file = self.bench.path(f"{interface}.pcap")
             process = self.bench.start(
                 self.bench.near, "tcpdump", "-i", interface, "-B", 65536, "-s", LONGEST, "-U", "--immediate-mode", "-Z", "root",
-                "-w", file, "ether proto 0x88a4",
+                "-w", file, EVERY_FRAME,
             )
             # It says so once it listens.
             while (line := process.stderr.readline()) and "listening on" not in line:
                 pass
             self.files.append(file)
             self.processes.append(process)
-        self.before = self.crossed()
+        self.before, self.begun = self.crossed(), time.monotonic()
         return self
 
     def crossed(self):
@@ -277,7 +286,7 @@ class Capture:
         return sum(self.bench.packets(interface) for interface in (NEAR, NEAR_B))
 
     def __exit__(self, *_):
-        self.passed = self.crossed() - self.before
+        self.passed, self.took_ms = self.crossed() - self.before, (time.monotonic() - self.begun) * 1e3
         # It may be behind: it has all once its files grow no more.
         size, end_at = -1, time.monotonic() + 10
         while (now := sum(file.stat().st_size for file in self.files)) != size and time.monotonic() < end_at:

@@ -109,6 +109,9 @@ class Cell:
     # right, open, none, missed, cause, place, alarm
     outcome: str
     said: str
+    # The same of the recording of what was heard, judged afterwards.
+    outcome_recorded: str = ""
+    said_recorded: str = ""
 
     def key(self):
         return (self.client, self.name, self.when)
@@ -182,11 +185,17 @@ def play(one, name):
             for when, process in listeners.items():
                 _, out, err = line.stop(process)
                 diagnosis = parse(out, err)
-                outcome, said = judged(one, name, diagnosis)
-                cells.append(Cell(name, one.name, when, outcome, said))
+                heard = judged(one, name, diagnosis)
+                cells.append(Cell(name, one.name, when, *heard, *recorded(line, one, name, records[when])))
                 keep(cells[-1], records[when])
             driver.process.kill()
     return cells
+
+
+def recorded(line, one, client, record):
+    """The outcome of the recording alone, and what was said; as that of a listener where nothing was heard."""
+    _, out, err = line.run(line.near, LINESMAN, "diagnose", record, "--json")
+    return judged(one, client, parse(out, err))
 
 
 def command(client):
@@ -241,7 +250,7 @@ def listen(line, record, pause=0.0):
 
 
 def keep(cell, record):
-    if KEEP and cell.outcome not in GOOD:
+    if KEEP and (cell.outcome not in GOOD or cell.said_recorded != cell.said):
         file = "-".join(cell.key()).lower().replace(" ", "-")
         shutil.copy(record, pathlib.Path(KEEP) / f"{file}.pcapng")
 
@@ -264,13 +273,14 @@ def played(names, words=(), only=None):
             except Skip:
                 raise
             except Exception as error:
-                cells += [Cell(name, one.name, when, "failed", f"{type(error).__name__}: {error}".splitlines()[0]) for when in WHENS]
+                why = f"{type(error).__name__}: {error}".splitlines()[0]
+                cells += [Cell(name, one.name, when, "failed", why, "failed", why) for when in WHENS]
     return cells
 
 
 def agrees(cell):
-    """Whether it came out as it is to be."""
-    return cell.outcome in GOOD
+    """Whether it came out as it is to be, while it was listened and from the recording."""
+    return cell.outcome in GOOD and cell.outcome_recorded in GOOD
 
 
 def settled(names, words=()):
@@ -283,6 +293,15 @@ def settled(names, words=()):
         if not again:
             break
     return sorted(cells.values(), key=lambda cell: (cell.client, order(cell.name), WHENS.index(cell.when)))
+
+
+def told_counts(cells):
+    """How many cells are admissible and right: heard, and from the recording."""
+    admissible = sum(cell.outcome in GOOD for cell in cells)
+    right, recorded_right = (
+        sum(getattr(cell, one) in ("right", "none") for cell in cells) for one in ("outcome", "outcome_recorded")
+    )
+    return f"{admissible} of {len(cells)} cells admissible; right {right} heard, {recorded_right} from recordings"
 
 
 def order(name):
@@ -326,7 +345,9 @@ def main():
     cells = settled(list(CLIENTS), words)
     for cell in cells:
         print(f"{cell.outcome:7} {cell.client:9} {cell.name:20} {cell.when:5} {cell.said}", flush=True)
-    print(f"{sum(cell.outcome in GOOD for cell in cells)} of {len(cells)} admissible, {time.monotonic() - begin:.0f} s")
+        if cell.said_recorded != cell.said:
+            print(f"{cell.outcome_recorded:7} {'':9} {'from the recording':20} {'':5} {cell.said_recorded}", flush=True)
+    print(f"{told_counts(cells)}, {time.monotonic() - begin:.0f} s")
     if "--write" in sys.argv:
         write(cells)
 

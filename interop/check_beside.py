@@ -4,7 +4,7 @@ What may be said in which case stands in beside_matrix.py: a cell that is wrong 
 again, as it may have been the host.
 """
 
-from beside_matrix import agrees, document_outcomes, settled
+from beside_matrix import agrees, document_outcomes, settled, told_counts
 from harness import check
 
 
@@ -12,14 +12,14 @@ def beside(line, name):
     cells = settled([name])
     odd = [cell for cell in cells if not agrees(cell)]
     assert not odd, "; ".join(told(cell) for cell in odd)
-    line.notes.append(f"{len(cells)} cells admissible")
+    line.notes.append(told_counts(cells))
     written = document_outcomes(name)
     differing = [cell.key() for cell in cells if not written.get(cell.key())]
     assert not differing, f"docs/guide/beside.md tells otherwise of {differing}: `beside_matrix.py --write` writes it"
 
 
 def told(cell):
-    return f"{cell.client}, {cell.name}, {cell.when} is wrong ({cell.outcome}): {cell.said}"
+    return f"{cell.client}, {cell.name}, {cell.when} is wrong ({cell.outcome}): {cell.said}; from the recording ({cell.outcome_recorded}): {cell.said_recorded}"
 
 
 @check

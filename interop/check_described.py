@@ -41,7 +41,7 @@ def soem_drives_devices_from_descriptions_of_their_makers(line):
             result = SOEM.run(line, NEAR, CYCLES, CYCLE_US, images, "axes")
         found = [tuple(device[:2]) for device in result["devices"]]
         assert found == [identity for *_, identity in DEVICES], found
-        ran(result)
+        ran(line, result)
         for number, (wanted, image) in enumerate(zip(rounds, result["rounds"], strict=True)):
             arrived(number, wanted, image, watch)
 

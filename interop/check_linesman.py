@@ -84,7 +84,7 @@ def a_listener_beside_soem_sends_nothing(line):
         status, out, err = line.stop(listener)
         seen = watched(line, watch)
         assert set(seen) == {SOEM_ADDRESS}, f"others sent as well: {seen}"
-        ran(result)
+        ran(line, result)
         diagnosis = parse(out, err)
         healthy(line, status, diagnosis)
         network = diagnosis["network"]
@@ -100,6 +100,7 @@ def linesman_leaves_a_driven_line_alone(line):
         rounds = line.path("rounds.json")
         rounds.write_text("[{}]")
         watch = watcher(line)
+        began = time.monotonic()
         driver = line.start(line.near, *SOEM.command(), NEAR, 2000, CYCLE_US, rounds)
         time.sleep(2)
         for command in (["scan", NEAR, "--json"], ["diagnose", NEAR, "--seconds", 1, "--json"]):
@@ -108,7 +109,7 @@ def linesman_leaves_a_driven_line_alone(line):
             assert "listen:" in out + err, f"{command[0]} does not point to listen: {err}"
         status, out, err = line.finish(driver)
         assert status == 0, err[-600:]
-        ran(parse(out.strip().splitlines()[-1], err))
+        ran(line, parse(out.strip().splitlines()[-1], err) | {"began": began})
         seen = watched(line, watch)
         assert set(seen) == {SOEM_ADDRESS}, f"frames of others were on the line: {seen}"
 
@@ -120,8 +121,9 @@ def listening(line):
     return process
 
 
-def watcher(line):
-    process = line.start(line.far, sys.executable, HERE / "watch.py", FAR)
+def watcher(line, interface=FAR):
+    """Counts the frames that arrive at this interface of the segment's end, by source address."""
+    process = line.start(line.far, sys.executable, HERE / "watch.py", interface)
     assert process.stdout.readline() == "ready\n"
     return process
 

@@ -1,5 +1,7 @@
 """A SubDevice loses its power while a foreign MainDevice runs: what that one sees, and how the line comes back."""
 
+import time
+
 from bench import NEAR, Segment
 from harness import CRAB, CYCLE_US, LINE, LINESMAN, SOEM, check, found, ran, rounds_file, until_present, values_came_back
 
@@ -15,6 +17,7 @@ def soem_brings_back_a_subdevice_that_lost_its_power(line):
     with Segment(line, LINESMAN, LINE.file) as segment:
         rounds, wires = LINE.draw(2, seed=5), segment.wires()
         file = rounds_file(line, LINE, rounds)
+        began = time.monotonic()
         with line.telling(*SOEM.command("soem_recover.py"), NEAR, CYCLE_US, file) as client:
             told = client.next(30)
             assert told == {"at": "op", "wkc": LINE.wkc()}, told
@@ -22,7 +25,7 @@ def soem_brings_back_a_subdevice_that_lost_its_power(line):
             assert client.next(30) == {"at": "lost"}
             assert client.next(70) == {"at": "back"}
             result = client.next(30)
-        ran(result, plant=LINE)
+        ran(line, result | {"began": began}, LINE)
         values_came_back(result, LINE, rounds, wires)
         numbers = {name: number for number, (name, _, _) in enumerate(LINE.devices, 1)}
         # The terminal begins anew; the one behind it was out of reach, and its watchdog took it to SAFEOP.
@@ -48,7 +51,7 @@ def ethercrab_sees_a_subdevice_that_lost_its_power(line):
         for next_client in (CRAB, SOEM):
             result = next_client.exchange(line, LINE, rounds)
             found(result, LINE, next_client)
-            ran(result, plant=LINE)
+            ran(line, result, LINE)
             values_came_back(result, LINE, rounds, segment.wires())
 
 

@@ -1,7 +1,7 @@
 """Foreign MainDevices take a SubDevice, a line and a tree to OP and exchange process data."""
 
 from bench import FAR, FAR_B, HERE, NEAR, NEAR_B, Segment, Watch
-from harness import CAT, CRAB, LINE, LINESMAN, ONE, SOEM, TREE, check, found, ran, to_op, values_came_back
+from harness import CAT, CRAB, EBPF, LINE, LINESMAN, ONE, SOEM, TREE, check, found, ran, to_op, values_came_back
 from plant import Plant
 
 RING = Plant(HERE / "ring.toml")
@@ -22,6 +22,11 @@ def kickcat_takes_one_subdevice_to_op(line):
     to_op(line, ONE, CAT)
 
 
+@check
+def ebpfcat_takes_one_subdevice_to_op(line):
+    to_op(line, ONE, EBPF)
+
+
 # proves: ESC-05
 @check
 def soem_takes_the_line_to_op(line):
@@ -39,6 +44,11 @@ def kickcat_takes_the_line_to_op(line):
 
 
 @check
+def ebpfcat_takes_the_line_to_op(line):
+    assert to_op(line, LINE, EBPF) >= 40
+
+
+@check
 def soem_takes_the_tree_to_op(line):
     assert to_op(line, TREE, SOEM, cycles=800) >= 200
 
@@ -51,6 +61,11 @@ def ethercrab_takes_the_tree_to_op(line):
 @check
 def kickcat_takes_the_tree_to_op(line):
     assert to_op(line, TREE, CAT, cycles=800) >= 200
+
+
+@check
+def ebpfcat_takes_the_tree_to_op(line):
+    assert to_op(line, TREE, EBPF, cycles=800) >= 200
 
 
 @check
@@ -74,7 +89,7 @@ def inputs_held_from_outside_are_read(line):
             segment.ask(do="set", input=name, value=value)
         rounds = LINE.draw(2)
         result = SOEM.exchange(line, LINE, rounds)
-        ran(result)
+        ran(line, result)
         for image in result["rounds"]:
             read = LINE.read(image)
             wrong = {name: (read[name], value) for name, value in held.items() if read[name] != value}
@@ -90,7 +105,7 @@ def one_foreign_maindevice_after_the_other(line):
             rounds = LINE.draw(2, seed)
             result = client.exchange(line, LINE, rounds, cycles=100)
             found(result, LINE, client)
-            ran(result)
+            ran(line, result)
             values_came_back(result, LINE, rounds, wires)
 
 
@@ -117,8 +132,8 @@ def ring(line, client):
         with Watch(segment, RING.shown(rounds[0]), break_it) as watch:
             result = client.exchange(line, RING, rounds, cycles=2000, on=f"{NEAR}+{NEAR_B}")
         assert watch.then is None, "the ring was not broken"
-        # One frame may have been crossing the break; a few more may be late on a busy host.
-        ran(result, plant=RING)
+        # One frame may have been crossing the break.
+        ran(line, result, RING, lost=1)
         values_came_back(result, RING, rounds, wires)
         status, out, _ = line.python(line.near, "probe.py", f"{NEAR}+{NEAR_B}")
         assert (status, out) == (0, "2\n"), f"the ring did not break: {out!r} answer on the first card"

@@ -2,18 +2,18 @@
 
 2,000 cycles with each fault: exactly the faulty cycles are bad, what is doubled or stray costs none, each kind is counted
 under its own name, and the run goes on. A host that runs other programs beside brings frames late by itself: these, too, have
-to be counted as late, each of them once, and are the only ones that may come on top.
+to be counted as late, each of them once. Where it held a frame at the cable, or a cycle had to be left out, as many frames as
+that may be counted otherwise; on a host that did neither, none.
 """
 
 import sys
 
 from bench import FAR, HERE, NEAR, Segment, inside, parse
-from harness import LINE, LINESMAN, WATCHDOG_MS, Skip, check, watchdogs_expired
+from harness import LINE, LINESMAN, WATCHDOG_MS, check, watchdogs_expired
 
 CYCLE_US, SETTLED, COUNTED = 8000, 200, 2000
 # A host that holds a frame for longer than most of a cycle has lost it by itself.
 LIMIT_MS = 5.0
-ATTEMPTS = 4
 # Both ends of a further cable, between what spoils and the segment.
 BEFORE, BEHIND = "veth8", "veth9"
 NAMES = ("frames_lost", "frames_late", "frames_duplicate", "frames_stray", "frames_truncated")
@@ -26,26 +26,22 @@ def spoiled(line, fault, every):
         inside(line.far, "sysctl", "-q", "-w", f"net.ipv6.conf.{name}.disable_ipv6=1")
         inside(line.far, "ip", "link", "set", name, "up")
     seconds = (SETTLED + COUNTED) * CYCLE_US / 1e6 + 4
-    for _ in range(ATTEMPTS):
-        cable = line.start(
-            line.far, sys.executable, HERE / "wire_faults.py", FAR, BEFORE, fault, every, SETTLED, COUNTED, LIMIT_MS,
+    cable = line.start(
+        line.far, sys.executable, HERE / "wire_faults.py", FAR, BEFORE, fault, every, SETTLED, COUNTED, LIMIT_MS,
+    )
+    assert cable.stdout.readline().strip() == "ready"
+    segment = Segment(line, LINESMAN, LINE.file, on=BEHIND)
+    segment.near = NEAR
+    with segment:
+        status, out, err = line.run(
+            line.near, LINESMAN, "run", "--on", NEAR, "--seconds", seconds, "--cycle-us", CYCLE_US, "--json",
+            seconds=seconds + 60,
         )
-        assert cable.stdout.readline().strip() == "ready"
-        segment = Segment(line, LINESMAN, LINE.file, on=BEHIND)
-        segment.near = NEAR
-        with segment:
-            status, out, err = line.run(
-                line.near, LINESMAN, "run", "--on", NEAR, "--seconds", seconds, "--cycle-us", CYCLE_US, "--json",
-                seconds=seconds + 60,
-            )
-            expired = watchdogs_expired(line)
-            _, told, words = line.stop(cable)
-        assert status in (0, 1), f"status {status}: {(out + err)[-600:]}"
-        told, report = parse(told, words), parse(out, err)
-        latest_ms = report["lateness"]["max_ns"] / 1e6
-        if told["held"] == 0 and report["counts"]["cycles_missed"] == 0 and latest_ms < LIMIT_MS:
-            return report, told, expired
-    raise Skip(f"the host is too busy: {told}, a cycle began {latest_ms:.1f} ms late")
+        expired = watchdogs_expired(line)
+        _, told, words = line.stop(cable)
+    assert status in (0, 1), f"status {status}: {(out + err)[-600:]}"
+    told, report = parse(told, words), parse(out, err)
+    return report, told, expired
 
 
 def judge(line, fault, every, cycles_lost, **counted):
@@ -55,19 +51,25 @@ def judge(line, fault, every, cycles_lost, **counted):
     assert told["cyclic"] > SETTLED + COUNTED, told
     assert told["spoiled"] == expected, told
     assert report["error"] is None and report["settled"], report
+    # What the cable and the run say of the host, each of them once per frame or cycle.
+    excused = told["held"] + counts["cycles_missed"]
+    assert excused <= COUNTED // 100, f"the host spoiled it by itself: {told}, {counts['cycles_missed']} cycles missed"
+    latest_ms = report["lateness"]["max_ns"] / 1e6
+    is_late = counts["cycles_missed"] == 0 or latest_ms > LIMIT_MS
+    assert is_late, f"{counts['cycles_missed']} cycles missed, and none began more than {latest_ms:.1f} ms late"
     seen = {name: counts[name] for name in NAMES}
     wanted = {name: expected if name in counted else 0 for name in NAMES}
     # What the host brought late is lost for its cycle and comes after all.
-    late = seen["frames_late"] - wanted["frames_late"]
-    if late > COUNTED // 10:
-        raise Skip(f"the host is too busy: it brought {late} frames late")
-    if late * CYCLE_US / 1e3 >= WATCHDOG_MS and expired > 0:
-        raise Skip(f"the host is too busy: it stood still for longer than a watchdog, {late} frames late")
+    late = max(0, seen["frames_late"] - wanted["frames_late"])
+    assert late <= COUNTED // 10, f"the host spoiled it by itself: it brought {late} frames late"
+    is_short = late * CYCLE_US / 1e3 < WATCHDOG_MS or expired == 0
+    assert is_short, f"the host spoiled it by itself: it stood still for longer than a watchdog, {late} frames late"
     wanted["frames_late"] += late
     wanted["frames_lost"] += late
-    assert late >= 0 and seen == wanted, f"{seen}, expected {wanted}; {told}"
+    off = {name: seen[name] - wanted[name] for name in NAMES if abs(seen[name] - wanted[name]) > excused}
+    assert not off, f"{seen}, expected {wanted} within {excused}; {told}"
     bad = expected if cycles_lost else 0
-    assert bad <= counts["cyclic_lost"] <= bad + late, counts
+    assert bad - excused <= counts["cyclic_lost"] <= bad + late + excused, f"{counts}, expected {bad} lost; {told}"
     assert counts["working_counter_errors"] == 0, counts
     assert all(device["valid"] for device in report["devices"]), report["devices"]
 

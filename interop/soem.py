@@ -13,9 +13,7 @@ def main():
     master = pysoem.Master()
     master.open(*asked.interfaces)
     try:
-        # A busy host may be late at the very first frame; how many attempts it took is told.
-        attempts = next((number for number in range(1, 4) if master.config_init() > 0), 0)
-        if not attempts:
+        if master.config_init() <= 0:
             peer.refuse("config_init found no SubDevice")
         devices = [[slave.man, slave.id, slave.rev] for slave in master.slaves]
         names = [slave.name for slave in master.slaves]
@@ -33,7 +31,7 @@ def main():
         shared = shared_addresses(master) if asked.overlap else []
         stop(master)
         peer.report(
-            attempts=attempts, devices=devices, names=names, state=state, mapped=mapped, shared=shared,
+            devices=devices, names=names, state=state, mapped=mapped, shared=shared,
             wkc=wkc, cycles=asked.cycles, complete=complete, rounds=inputs, clocks=clocks,
         )
     finally:

@@ -13,8 +13,11 @@ import sys
 import threading
 import time
 
-# The shortest time that foreign MainDevices wait for a frame is 2 ms, those for a word of the SII 20 ms.
-LATE_MS = 8.0
+# What counts as a stall: a program that wanted to sleep for 1 ms, or to run at once, waited for longer. The shortest time that
+# foreign MainDevices wait for a frame is 2 ms.
+LATE_MS = 2.0
+# What excuses a check that failed: less than most of the shortest cycle of those that judge each frame, 8 ms.
+EXCUSE_MS = 5.0
 
 WATCH = f"""
 import time
@@ -42,11 +45,11 @@ class Stalls:
             begin, end = map(float, line.split())
             self.seen.append((begin, end))
 
-    def longest_ms(self, since):
-        """For how long the host stood still at a time since then; 0 when it never did for LATE_MS."""
+    def since(self, begin):
+        """How long each stall since then was, in milliseconds; none of them is shorter than LATE_MS."""
         # What happened a moment ago may still be on its way here.
         time.sleep(0.05)
-        return max(((end - begin) * 1e3 for begin, end in list(self.seen) if end >= since), default=0.0)
+        return [(end - max(start, begin)) * 1e3 for start, end in list(self.seen) if end >= begin]
 
     def end(self):
         self.program.kill()
@@ -59,7 +62,9 @@ class Waits:
     EVERY_S = 0.01
 
     def __init__(self, running):
-        self.running, self.longest_ms, self.done = running, 0.0, False
+        self.running, self.done = running, False
+        # When a wait was seen, and how long it was in milliseconds.
+        self.seen = []
 
     def __enter__(self):
         self.thread = threading.Thread(target=self.look, daemon=True)
@@ -76,7 +81,11 @@ class Waits:
             since, before = (now - before) * 1e3, now
             jumps = (ms - last[task] - since for task, ms in waited.items() if task in last)
             if (longest := max(jumps, default=0.0)) > LATE_MS:
-                self.longest_ms = max(self.longest_ms, longest)
+                self.seen.append((now, longest))
+
+    def since(self, begin):
+        """How long each wait since then was, in milliseconds; none of them is shorter than LATE_MS."""
+        return [ms for at, ms in list(self.seen) if at >= begin]
 
     def waited_ms(self):
         """The time for which each thread has waited so far."""
@@ -94,3 +103,19 @@ class Waits:
     def __exit__(self, *_):
         self.done = True
         self.thread.join()
+
+
+class Host:
+    """What the host did to one check: stalls of all, and waits of its own programs."""
+
+    def __init__(self, stalls, waits):
+        self.stalls, self.waits = stalls, waits
+
+    def stood(self, since):
+        """How long each stall since then was, in milliseconds, by the one of the two that saw more."""
+        return max(self.stalls.since(since), self.waits.since(since), key=sum)
+
+    def excuse_ms(self, since):
+        """The longest stall since then, if it is long enough to excuse a check that failed, else 0."""
+        longest = max([*self.stalls.since(since), *self.waits.since(since)], default=0.0)
+        return longest if longest > EXCUSE_MS else 0.0

@@ -1,10 +1,13 @@
-//! `proves: ID [partial[: reason]], …`: which test shows which row.
+//! `proves: ID [(KINDS)] [partial[: reason]], …`: which test shows which row.
 //!
+//! KINDS are the proof letters that the test meets, U, S, P or V; where they are not named they follow from the place of
+//! the test ([`crate::kind`]), and a recording is always named.
 //! In Rust it is a `//` comment directly above `#[test]`, in a story a line of its head, in an
 //! interop program a `#` comment above the check. `partial` belongs to the row it stands behind; a
 //! reason may hold commas, and ends where the next row begins.
 
 use crate::files::TextFile;
+use crate::kind::{Ability, Kinds};
 
 /// One row that one test claims to show.
 #[derive(Clone, Debug, Eq, PartialEq)]
@@ -12,12 +15,20 @@ pub(crate) struct Claim {
     pub(crate) id: String,
     pub(crate) extent: Extent,
     pub(crate) surface: Surface,
+    /// The proof letters that it meets.
+    pub(crate) kinds: Kinds,
     /// From the root.
     pub(crate) path: String,
     /// From 1.
     pub(crate) line: usize,
     /// The test's name.
     pub(crate) test: String,
+}
+
+impl Claim {
+    pub(crate) fn is_full(&self) -> bool {
+        self.extent == Extent::Full
+    }
 }
 
 /// How much of the row is claimed.
@@ -116,16 +127,26 @@ fn read(file: &TextFile, language: Language, claims: &mut Vec<Claim>, errors: &m
             errors.push(format!("{at}: no test follows the annotation"));
             continue;
         };
-        match parse(&text) {
-            Err(why) => errors.push(format!("{at}: {why}")),
-            Ok(rows) => claims.extend(rows.into_iter().map(|(id, extent)| Claim {
-                id,
-                extent,
-                surface,
-                path: file.path.clone(),
-                line: index + 1,
-                test: test.clone(),
-            })),
+        let rows = match parse(&text) {
+            Ok(rows) => rows,
+            Err(why) => {
+                errors.push(format!("{at}: {why}"));
+                continue;
+            }
+        };
+        let ability = match language {
+            Language::Story => Ability::of_story(),
+            Language::Python => Ability::of_interop(),
+            Language::Rust => Ability::of_rust(&file.path, &file.text, &test),
+        };
+        for ClaimedRow { id, named, extent } in rows {
+            match ability.claim(&named) {
+                Err(why) => errors.push(format!("{at}: {id}: {why}")),
+                Ok(kinds) => {
+                    let (path, test) = (file.path.clone(), test.clone());
+                    claims.push(Claim { id, extent, surface, kinds, path, line: index + 1, test });
+                }
+            }
         }
     }
 }
@@ -161,35 +182,56 @@ fn python_check(lines: &[&str]) -> Option<String> {
     Some(rest[..rest.find('(')?].to_owned())
 }
 
+/// What an annotation says of one row.
+struct ClaimedRow {
+    id: String,
+    /// The kinds that it names, none if it leaves them to the place.
+    named: Kinds,
+    extent: Extent,
+}
+
 /// Reads what stands behind the marker.
-fn parse(text: &str) -> Result<Vec<(String, Extent)>, String> {
-    let mut rows: Vec<(String, Extent)> = Vec::new();
-    for item in text.split(',') {
-        let item = item.trim();
-        let (id, rest) = item.split_once(' ').unwrap_or((item, ""));
+fn parse(text: &str) -> Result<Vec<ClaimedRow>, String> {
+    let mut rows: Vec<ClaimedRow> = Vec::new();
+    for part in text.split(',') {
+        let part = part.trim();
+        let (id, rest) = part.split_once(' ').unwrap_or((part, ""));
         if is_id(id) {
-            let extent = match rest.trim().strip_prefix("partial").map(str::trim) {
+            let (named, rest) = named(rest.trim(), part)?;
+            let extent = match rest.strip_prefix("partial").map(str::trim) {
                 None if rest.is_empty() => Extent::Full,
                 Some("" | ":") => Extent::Partial(None),
                 Some(reason) if reason.starts_with(':') => {
                     Extent::Partial(Some(reason[1..].trim().to_owned()))
                 }
-                Some(_) | None => return Err(unreadable(item)),
+                Some(_) | None => return Err(unreadable(part)),
             };
-            rows.push((id.to_owned(), extent));
-        } else if let Some((_, Extent::Partial(Some(reason)))) = rows.last_mut() {
+            rows.push(ClaimedRow { id: id.to_owned(), named, extent });
+        } else if let Some(ClaimedRow { extent: Extent::Partial(Some(reason)), .. }) =
+            rows.last_mut()
+        {
             // A comma within a reason.
             reason.push_str(", ");
-            reason.push_str(item);
+            reason.push_str(part);
         } else {
-            return Err(unreadable(item));
+            return Err(unreadable(part));
         }
     }
     Ok(rows)
 }
 
+/// The letters in parentheses at the beginning of a text, and what follows them.
+fn named<'a>(rest: &'a str, part: &str) -> Result<(Kinds, &'a str), String> {
+    let Some(inside) = rest.strip_prefix('(') else { return Ok((Kinds::default(), rest)) };
+    let (letters, rest) = inside.split_once(')').ok_or_else(|| unreadable(part))?;
+    let kinds = Kinds::of(letters).map_err(|other| {
+        format!("{part:?}: {other:?} is no kind of test; expected letters of USPV")
+    })?;
+    Ok((kinds, rest.trim()))
+}
+
 fn unreadable(item: &str) -> String {
-    format!("{item:?} cannot be read; expected `ID [partial[: reason]], …`")
+    format!("{item:?} cannot be read; expected `ID [(KINDS)] [partial[: reason]], …`")
 }
 
 fn is_id(word: &str) -> bool {
@@ -260,6 +302,25 @@ mod tests {
     fn an_annotation_without_a_test_is_an_error() {
         assert_eq!(of("crates/a/src/b.rs", "// proves: FRM-02\nfn helper() {}\n"), (vec![], 1));
         assert_eq!(of("crates/a/src/b.rs", "// proves: FRM-02\n"), (vec![], 1));
+    }
+
+    #[test]
+    fn kinds_stand_in_parentheses_behind_the_row() {
+        let text = "// proves: FRM-02 (P), HW-03 (U P) partial: a\n#[test]\n\
+                    fn all() {\n    read(\"a.pcapng\");\n}\n";
+        let (claims, errors) = claims(&[TextFile::new("crates/proto/tests/b.rs", text)]);
+        assert!(errors.is_empty(), "{errors:?}");
+        let kinds: Vec<String> = claims.iter().map(|claim| claim.kinds.to_string()).collect();
+        assert_eq!(kinds, ["P", "UP"]);
+        assert_eq!(claims[1].extent, Extent::Partial(Some("a".into())));
+    }
+
+    #[test]
+    fn kinds_that_the_test_is_not_are_an_error() {
+        for row in ["FRM-02 (V)", "FRM-02 (H)", "FRM-02 (P", "FRM-02 (P)"] {
+            let text = format!("// proves: {row}\n#[test]\nfn all() {{\n}}\n");
+            assert_eq!(of("crates/proto/tests/b.rs", &text), (vec![], 1), "{row}");
+        }
     }
 
     #[test]

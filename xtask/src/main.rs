@@ -7,6 +7,7 @@
 mod annotation;
 mod features;
 mod files;
+mod kind;
 mod requirements;
 mod test;
 mod tidy;

@@ -1,6 +1,6 @@
 //! `docs/requirements.toml`: every row the product is to fulfil.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
@@ -34,17 +34,38 @@ pub(crate) struct Row {
     /// Letters of U, S, P, V, H: how it can be shown; see the file's head.
     pub(crate) proof: String,
     pub(crate) title: String,
+    /// What a test asserts that shows all of the row.
+    pub(crate) case: String,
+    /// Letters of `proof` that cannot be met here, and why.
+    #[serde(default)]
+    pub(crate) without: BTreeMap<char, String>,
 }
 
 impl Row {
-    /// The full claim needs hardware.
-    pub(crate) fn needs_hardware(&self) -> bool {
-        self.proof.contains('H')
-    }
-
     /// A pure calculation: a unit test beside the code is proof enough.
     pub(crate) fn is_calculation(&self) -> bool {
         self.proof == "U"
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.proof.is_empty() || self.proof.chars().any(|letter| !"USPVH".contains(letter)) {
+            bail!("proof is {:?}, expected letters of USPVH", self.proof);
+        }
+        if self.case.trim().is_empty() {
+            bail!("the acceptance case is empty");
+        }
+        for (letter, why) in &self.without {
+            if !self.proof.contains(*letter) {
+                bail!(
+                    "it is to do without {letter}, which is no letter of its proof {}",
+                    self.proof
+                );
+            }
+            if why.trim().is_empty() {
+                bail!("it is to do without {letter}, but does not say why");
+            }
+        }
+        Ok(())
     }
 }
 
@@ -59,14 +80,7 @@ impl Requirements {
                 if row.id.split_once('-').map(|(prefix, _)| prefix) != Some(&area.prefix) {
                     bail!("{FILE}: {} stands in the area {}", row.id, area.prefix);
                 }
-                if row.proof.is_empty() || row.proof.chars().any(|letter| !"USPVH".contains(letter))
-                {
-                    bail!(
-                        "{FILE}: {}: proof is {:?}, expected letters of USPVH",
-                        row.id,
-                        row.proof
-                    );
-                }
+                row.check().with_context(|| format!("{FILE}: {}", row.id))?;
                 if !seen.insert(&row.id) {
                     bail!("{FILE}: {} stands there twice", row.id);
                 }

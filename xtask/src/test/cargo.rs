@@ -119,6 +119,7 @@ pub(super) fn tests_of(context: &Context<'_>, packages: &str) -> Result<Outcome>
     let ran = context.command(&log("tests", packages), cargo(), &arguments).run()?;
     let counts = Counts::parse(&ran.output);
     for line in &counts.skipped {
+        context.note_skip(line);
         println!("    {line}");
     }
     if !ran.success() {

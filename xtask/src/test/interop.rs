@@ -37,6 +37,9 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
         if let Some(kind) = kind {
             counts[kind] += 1;
             println!("    {line}");
+            if line.starts_with("skip ") {
+                context.note_skip(line);
+            }
         }
     }
     let [passed, failed, skipped] = counts;

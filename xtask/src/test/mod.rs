@@ -10,8 +10,10 @@ mod habits;
 mod interop;
 mod peers;
 mod product;
+mod skips;
 mod tools;
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -21,6 +23,7 @@ use clap::Args;
 
 pub(crate) use check::{CheckOptions, run as check};
 use exec::Run;
+use skips::AllowedSkips;
 
 /// What to check.
 #[derive(Args, Default)]
@@ -40,6 +43,9 @@ pub(crate) struct Options {
     /// How many seeds the swarm runs
     #[arg(long, value_name = "N", default_value_t = 200)]
     swarm_seeds: u64,
+    /// How many seeds of this commit are scored
+    #[arg(long, value_name = "N", default_value_t = 200)]
+    score_seeds: u64,
     /// How many plants the demo draws
     #[arg(long, value_name = "N", default_value_t = 10)]
     demo_seeds: u64,
@@ -70,6 +76,8 @@ struct Context<'a> {
     logs: PathBuf,
     /// What could not be installed, and why.
     missing: BTreeMap<&'static str, String>,
+    /// What the steps have left out so far.
+    skipped: RefCell<Vec<String>>,
 }
 
 /// How a step ended.
@@ -110,6 +118,7 @@ const STEPS: &[Step] = &[
     Step { name: "demo", quick: false, alone: false, run: product::demo },
     Step { name: "stories", quick: false, alone: false, run: product::stories },
     Step { name: "swarm", quick: false, alone: false, run: product::swarm },
+    Step { name: "score", quick: false, alone: false, run: product::score },
     Step { name: "habits", quick: false, alone: false, run: habits::run },
     Step { name: "fuzz", quick: false, alone: false, run: fuzz::run },
     Step { name: "interop", quick: false, alone: false, run: interop::run },
@@ -139,11 +148,33 @@ pub(crate) fn run(root: &Path, options: &Options) -> Result<bool> {
     if wanted {
         context.missing = tools::prepare(&context);
     }
+    let allowed = AllowedSkips::read(root)?;
     let mut rows = Vec::new();
     for step in STEPS.iter().filter(chosen) {
-        take(step.name, &mut rows, || (step.run)(&context));
+        take(step.name, &mut rows, || strictly(&allowed, &context, step));
     }
-    Ok(summary(&rows))
+    let passed = summary(&rows);
+    println!("{}", allowed.not_tried(&context.skipped.borrow()));
+    Ok(passed)
+}
+
+/// Takes a step; where nobody watches, one that leaves out what is not on the list has failed.
+fn strictly(allowed: &AllowedSkips, context: &Context<'_>, step: &Step) -> Result<Outcome> {
+    let before = context.skipped.borrow().len();
+    let outcome = (step.run)(context)?;
+    if let Outcome::Skipped(why) = &outcome {
+        context.note_skip(&format!("{}: {why}", step.name));
+    }
+    let skipped = context.skipped.borrow();
+    match (allowed.unexpected(&skipped[before..]), outcome) {
+        (Some(line), Outcome::Passed { count, .. }) if skips::is_strict() => {
+            Ok(Outcome::Failed { count, why: format!("left out, and not on the list: {line}") })
+        }
+        (Some(line), Outcome::Skipped(_)) if skips::is_strict() => {
+            Ok(Outcome::Failed { count: 0, why: format!("left out, and not on the list: {line}") })
+        }
+        (_, outcome) => Ok(outcome),
+    }
 }
 
 /// A step that was taken.
@@ -208,7 +239,19 @@ impl<'a> Context<'a> {
         let target = cargo::target_folder(root);
         let logs = target.join("xtask");
         std::fs::create_dir_all(&logs)?;
-        Ok(Self { root, options, target, logs, missing: BTreeMap::new() })
+        Ok(Self {
+            root,
+            options,
+            target,
+            logs,
+            missing: BTreeMap::new(),
+            skipped: RefCell::default(),
+        })
+    }
+
+    /// Remembers that something is left out.
+    fn note_skip(&self, line: &str) {
+        self.skipped.borrow_mut().push(line.to_owned());
     }
 
     /// A command in the project's root that logs to `NAME.log`.

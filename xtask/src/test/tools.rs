@@ -17,9 +17,13 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("python3", "--version", "python3"),
 ];
 
-/// Foreign MainDevices from Python's registry.
-const PYTHON_PACKAGES: &[(&str, &str)] =
-    &[("pysoem", "pysoem==1.1.13"), ("kickcat", "kickcat==2.5")];
+/// Foreign MainDevices from Python's registry, and a reader of tables.
+const PYTHON_PACKAGES: &[(&str, &str)] = &[
+    ("pysoem", "pysoem==1.1.13"),
+    ("kickcat", "kickcat==2.5"),
+    ("ebpfcat", "ebpfcat==1.0.0"),
+    ("duckdb", "duckdb==2.0.1"),
+];
 
 /// Runs as root.
 pub(super) fn is_root() -> bool {
@@ -114,6 +118,6 @@ pub(super) fn python(context: &Context<'_>) -> Result<PathBuf, String> {
             Err(error) => println!("    {error:#}"),
         }
     }
-    // The other foreign MainDevices are tried when they are there; this one is the referee.
+    // The others are tried when they are there; this one is the referee.
     if there("pysoem") { Ok(python) } else { Err("pysoem cannot be installed".into()) }
 }
