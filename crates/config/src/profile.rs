@@ -2,6 +2,8 @@
 //!
 //! It is made from the SII image, which the device itself carries.
 
+mod sync_times;
+
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
@@ -9,6 +11,8 @@ use linesman_proto::sii::{
     Direction, FmmuUsage, Image, MailboxPair, OpMode, PortKind, Protocols, SyncManagerKind,
 };
 use linesman_proto::time::Span;
+
+pub use sync_times::{DirectionTimes, SyncTimes};
 
 /// A SyncManager for process data.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -80,6 +84,8 @@ pub struct DeviceProfile {
     pub fmmus: Vec<FmmuUsage>,
     /// Its operation modes with distributed clocks.
     pub clock_modes: Vec<ClockMode>,
+    /// What it needs for its work in a cycle, as far as its dictionary says; an SII says nothing.
+    pub sync_times: SyncTimes,
 }
 
 /// An operation mode with distributed clocks (SII category 60; ESI `Dc/OpMode`).
@@ -95,6 +101,8 @@ pub struct ClockMode {
     pub sync0_cycle_factor: i16,
     /// Shift of SYNC0 in ns.
     pub sync0_shift_ns: i32,
+    /// SYNC0 refers to the shift of the inputs; an SII does not say it (`None`).
+    pub input_reference: Option<bool>,
     /// Cycle of SYNC1 in cycles of SYNC0.
     pub sync1_cycle_factor: i16,
     /// Shift of SYNC1 in ns.
@@ -177,6 +185,7 @@ impl DeviceProfile {
             spare_pdos: pdos(image, false),
             clock_modes: image.op_modes().map(|mode| clock_mode(image, mode)).collect(),
             fmmus: image.fmmu_usages().to_vec(),
+            sync_times: SyncTimes::default(),
         }
     }
 
@@ -241,6 +250,7 @@ fn clock_mode(image: &Image, mode: &OpMode) -> ClockMode {
         sync0_cycle_ns: mode.sync0_cycle_ns,
         sync0_cycle_factor: mode.sync0_cycle_factor,
         sync0_shift_ns: mode.sync0_shift_ns,
+        input_reference: None,
         sync1_cycle_factor: mode.sync1_cycle_factor,
         sync1_shift_ns: mode.sync1_shift_ns,
     }

@@ -250,6 +250,7 @@ fn clock(element: &Element) -> Result<Option<ClockSettings>, EsiError> {
         assign_activate: 0,
         sync0_cycle: span("CycleTime0")?,
         sync0_shift_ns: clock.child_number("ShiftTime")?.unwrap_or(0),
+        input_reference: Some(false),
         sync1_cycle: span("CycleTime1")?,
         reference: matches!(clock.child_text("ReferenceClock"), "1" | "true"),
     }))

@@ -252,6 +252,7 @@ fn everything() -> Plan {
         assign_activate: 0x0700,
         sync0_cycle: Span::ms(1),
         sync0_shift_ns: -20_000,
+        input_reference: Some(false),
         sync1_cycle: Span::us(500),
         reference: true,
     });

@@ -18,6 +18,9 @@ pub struct EsiOpMode {
     pub sync0_cycle_factor: i16,
     /// Shift of SYNC0 in ns.
     pub sync0_shift_ns: i32,
+    /// SYNC0 refers to the shift of the inputs instead of that of the outputs (`ShiftTimeSync0` with
+    /// `Input="1"`, SYN-08).
+    pub input_reference: bool,
     /// Cycle of SYNC1, in cycles of SYNC0.
     pub sync1_cycle_factor: i16,
     /// Shift of SYNC1 in ns.
@@ -69,6 +72,10 @@ fn op_mode(element: &Element) -> Result<EsiOpMode, EsiError> {
         sync0_cycle_ns: element.child_number("CycleTimeSync0")?.unwrap_or(0),
         sync0_cycle_factor: factor("CycleTimeSync0")?,
         sync0_shift_ns: element.child_number("ShiftTimeSync0")?.unwrap_or(0),
+        input_reference: match element.child("ShiftTimeSync0") {
+            Some(shift) => shift.flag("Input")?,
+            None => false,
+        },
         sync1_cycle_factor: factor("CycleTimeSync1")?,
         sync1_shift_ns: element.child_number("ShiftTimeSync1")?.unwrap_or(0),
         sync_managers: element.children("Sm").map(sync_manager).collect::<Result<_, _>>()?,

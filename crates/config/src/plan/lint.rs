@@ -45,6 +45,20 @@ pub struct Doubt {
     pub advice: String,
 }
 
+impl DevicePlan {
+    /// True if it has a port for a cable, or nobody says what its ports are.
+    #[must_use]
+    pub fn has_cable_port(&self) -> bool {
+        self.ports.is_none_or(|ports| ports.0.contains(&PortKind::Mii))
+    }
+
+    /// The least time by which it delays a frame on the way out and back (SYN-17).
+    #[must_use]
+    pub fn least_delay(&self) -> Span {
+        Span::ns(if self.has_cable_port() { CABLE_DELAY_NS } else { EBUS_DELAY_NS })
+    }
+}
+
 impl Plan {
     /// Share of the wire's time that a task's frames take, in percent.
     #[must_use]
@@ -64,12 +78,8 @@ impl Plan {
     /// delay it.
     #[must_use]
     pub fn least_delay(&self) -> Span {
-        let cable = |device: &&DevicePlan| {
-            device.ports.is_none_or(|ports| ports.0.contains(&PortKind::Mii))
-        };
-        let cables = self.devices.iter().filter(cable).count() as u64;
-        let terminals = self.devices.len() as u64 - cables;
-        Span::ns(cables * CABLE_DELAY_NS + terminals * EBUS_DELAY_NS)
+        let delays = self.devices.iter().map(|device| device.least_delay().as_nanos());
+        Span::ns(delays.sum())
     }
 
     /// All that is doubtful, the worst first.

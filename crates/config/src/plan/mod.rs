@@ -31,7 +31,7 @@ use linesman_proto::time::Span;
 use linesman_proto::topology::Tree;
 
 use crate::identity::RevisionRule;
-use crate::profile::{DeviceProfile, Mailbox};
+use crate::profile::{DeviceProfile, Mailbox, SyncTimes};
 use crate::start_up::StartUpCommand;
 
 pub use cycle::CycleError;
@@ -43,6 +43,7 @@ pub use settings::{
     AddressingChoice, AutomaticActions, ClockSettings, DeviceSettings, OnWrongCounter,
     ProcessAccess, WatchdogSettings,
 };
+pub use shift::ShiftReference;
 pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};
 pub use variable::Variable;
 
@@ -84,6 +85,8 @@ pub struct Plan {
     pub variables: Vec<Variable>,
     /// The shift of the outputs, where it was chosen; see [`Plan::outputs_shift`].
     pub outputs_shift: Option<Span>,
+    /// The shift of the inputs in ns, where it was chosen; see [`Plan::inputs_shift_ns`].
+    pub inputs_shift_ns: Option<i64>,
     /// How far a clock may be off the reference clock (0x092C) before that is told (DC-21); `None`: as far as
     /// the MainDevice lets it be before OP.
     pub sync_window: Option<Span>,
@@ -131,6 +134,8 @@ pub struct DevicePlan {
     pub ebus_current_ma: Option<i16>,
     /// What its ports are; `None`: not said.
     pub ports: Option<PortMap<PortKind>>,
+    /// What it needs for its work in a cycle, as far as that is known.
+    pub sync_times: SyncTimes,
 }
 
 impl DevicePlan {
@@ -157,6 +162,7 @@ impl DevicePlan {
             settings: DeviceSettings::default(),
             ebus_current_ma: None,
             ports: None,
+            sync_times: SyncTimes::default(),
         }
     }
 }
@@ -173,6 +179,7 @@ impl Plan {
             inputs_len: 0,
             variables: Vec::new(),
             outputs_shift: None,
+            inputs_shift_ns: None,
             sync_window: None,
             ports_open_by_order: false,
         }

@@ -98,8 +98,11 @@ pub struct ClockSettings {
     pub assign_activate: u16,
     /// Cycle of SYNC0.
     pub sync0_cycle: Span,
-    /// How much later SYNC0 falls than the shift of the outputs says, in ns.
+    /// How much later SYNC0 falls than the shift of the network says, in ns.
     pub sync0_shift_ns: i64,
+    /// The shift of the network that SYNC0 refers to: that of the inputs, or that of the outputs. `None`:
+    /// that of the inputs for a SubDevice with inputs only (SYN-07, SYN-08).
+    pub input_reference: Option<bool>,
     /// Cycle of SYNC1, register 0x09A4; 0 with a SYNC1 that follows SYNC0.
     pub sync1_cycle: Span,
     /// It is to be the reference clock.

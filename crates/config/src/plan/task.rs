@@ -65,6 +65,12 @@ impl FramePlan {
         Self { datagrams, ahead: Span::ZERO, repeats: 0 }
     }
 
+    /// True if one of its datagrams is for this.
+    #[must_use]
+    pub fn has(&self, role: Role) -> bool {
+        self.datagrams.iter().any(|datagram| datagram.role == role)
+    }
+
     /// Size in bytes without padding and check sequence.
     #[must_use]
     pub fn size(&self) -> usize {

@@ -38,6 +38,10 @@ pub struct Network {
     /// From the frames to SYNC0, in µs; 30 % of the cycle unless said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outputs_shift_us: Option<u32>,
+    /// From the frames to SYNC0 of SubDevices with inputs only, in µs; negative: before the next frames.
+    /// -10 % of the cycle unless said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inputs_shift_us: Option<i32>,
     /// How far a clock may be off the reference clock before that is told and the network counts as out of
     /// step, in ns; 1000 unless said.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,6 +65,7 @@ impl Default for Network {
             reinitialise: true,
             clear_counters: true,
             outputs_shift_us: None,
+            inputs_shift_us: None,
             sync_window_ns: None,
             ports_open_by_order: false,
         }
@@ -132,6 +137,7 @@ impl Network {
             clock_datagrams: true,
             mailbox_states: self.mailbox_states,
             outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
+            inputs_shift_ns: self.inputs_shift_us.map(|us| i64::from(us) * 1_000),
             sync_window: self.sync_window_ns.map(|ns| Span::ns(u64::from(ns))),
             ports_open_by_order: self.ports_open_by_order,
             ..PlanOptions::default()
@@ -153,9 +159,13 @@ pub struct ClockChoice {
     /// Cycle of SYNC0 in µs; that of its task unless said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_cycle_us: Option<u32>,
-    /// Shift of SYNC0 in ns, on top of the shift of the outputs.
+    /// Shift of SYNC0 in ns, on top of the shift of the network.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync0_shift_ns: Option<i64>,
+    /// SYNC0 refers to the shift of the inputs (`true`) or of the outputs (`false`). Unless said: as the mode of
+    /// its description has it, else that of the inputs for a device with inputs only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub input_reference: Option<bool>,
     /// Cycle of SYNC1 in µs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sync1_cycle_us: Option<u32>,
@@ -197,6 +207,7 @@ impl ClockChoice {
             assign_activate,
             sync0_cycle,
             sync0_shift_ns: self.sync0_shift_ns.unwrap_or(i64::from(mode.sync0_shift_ns)),
+            input_reference: self.input_reference.or(mode.input_reference),
             sync1_cycle: self.sync1_cycle_us.map_or(sync1_cycle, us),
             reference: self.reference,
         })
@@ -217,6 +228,11 @@ impl ClockChoice {
             ("assign_activate", hex(chosen.assign_activate), hex(described.assign_activate)),
             ("cycle of SYNC0", of(chosen.sync0_cycle), of(described.sync0_cycle)),
             ("shift of SYNC0", ns(chosen.sync0_shift_ns), ns(described.sync0_shift_ns)),
+            (
+                "shift that SYNC0 refers to",
+                referred(chosen.input_reference),
+                referred(described.input_reference),
+            ),
             ("cycle of SYNC1", of(chosen.sync1_cycle), of(described.sync1_cycle)),
         ];
         let differs = pairs.into_iter().filter(|(_, chosen, described)| chosen != described);
@@ -226,6 +242,14 @@ impl ClockChoice {
 
 fn of(span: Span) -> String {
     format!("{} ns", span.as_nanos())
+}
+
+fn referred(input_reference: Option<bool>) -> String {
+    match input_reference {
+        Some(true) => "that of the inputs".to_owned(),
+        Some(false) => "that of the outputs".to_owned(),
+        None => "that of its process data".to_owned(),
+    }
 }
 
 fn ns(value: i64) -> String {

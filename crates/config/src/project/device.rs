@@ -17,6 +17,7 @@ use crate::compare::Wanted;
 use crate::esi::value;
 use crate::identity::RevisionRule;
 use crate::plan::{AddressingChoice, OnWrongCounter, ProcessAccess};
+use crate::profile::SyncTimes;
 use crate::start_up::Transition;
 
 /// A SubDevice of a project.
@@ -95,6 +96,10 @@ pub struct ProjectDevice {
     /// Its distributed clock; it runs free unless said.
     #[serde(default)]
     pub clock: Option<ClockChoice>,
+    /// What it needs for its work in a cycle (objects 0x1C32 and 0x1C33), for `plan --timing`; what is not said
+    /// is that of its description.
+    #[serde(default)]
+    pub sync_times: SyncTimes,
     /// PDOs to be assigned, by index, instead of those of its description.
     #[serde(default)]
     pub pdos: Option<Vec<u16>>,
@@ -144,6 +149,7 @@ impl ProjectDevice {
             clear_counters: None,
             watchdog: WatchdogChoice::default(),
             clock: None,
+            sync_times: SyncTimes::default(),
             pdos: None,
             mappings: Vec::new(),
             start_up: Vec::new(),
@@ -246,6 +252,7 @@ impl ProjectDevice {
         let watchdog = &self.watchdog;
         choice("watchdog", (*watchdog != WatchdogChoice::default()).then(|| inline(watchdog)));
         choice("clock", self.clock.as_ref().map(inline));
+        choice("sync_times", (!self.sync_times.is_unknown()).then(|| inline(&self.sync_times)));
         choice("pdos", self.pdos.as_ref().map(inline));
         choice("modules", (!self.modules.is_empty()).then(|| inline(&self.modules)));
         for mapping in &self.mappings {

@@ -4,7 +4,7 @@ use super::{Described, ProjectDevice};
 use crate::esi::image::image;
 use crate::esi::mailbox::InitCommand;
 use crate::esi::{Esi, EsiDevice, EsiModule, EsiPdo};
-use crate::profile::DeviceProfile;
+use crate::profile::{DeviceProfile, SyncTimes};
 use crate::start_up::{StartUpAction, StartUpCommand, Transition, left_out};
 use linesman_proto::mailbox::coe::ObjectAddress;
 
@@ -45,7 +45,12 @@ impl Described {
         }
         let made = image(device, esi.vendor_id, &pdos).map_err(|error| error.to_string())?;
         let identity = Some([esi.vendor_id, device.product_code, device.revision]);
-        let profile = DeviceProfile::from_sii(&made);
+        let mut profile = DeviceProfile::from_sii(&made);
+        profile.sync_times = SyncTimes::from_dictionary(&device.objects);
+        // What an SII has no room for.
+        for (mode, described) in profile.clock_modes.iter_mut().zip(&device.op_modes) {
+            mode.input_reference = Some(described.input_reference);
+        }
         Ok(Self {
             profile,
             start_up,

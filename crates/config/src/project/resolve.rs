@@ -163,6 +163,7 @@ impl Project {
         map(device, &mut profile, &mut start_up)?;
         assign(device, &mut profile, &mut start_up)?;
         profile.measure();
+        profile.sync_times = device.sync_times.or(profile.sync_times);
         start_up.extend(device.start_up.iter().filter_map(command));
         let clock = device.clock.as_ref();
         let clock = clock.map(|one| one.settings(&profile.clock_modes, self.cycle_of(device)));

@@ -60,6 +60,9 @@ pub struct PlanOptions {
     pub presence: bool,
     /// The shift of the outputs: from the frames to SYNC0. `None`: 30 % of the cycle (SYN-11).
     pub outputs_shift: Option<Span>,
+    /// The shift of the inputs in ns: from the frames to SYNC0 of SubDevices with inputs only. `None`: -10 % of
+    /// the cycle.
+    pub inputs_shift_ns: Option<i64>,
     /// How far a clock may be off the reference clock before that is told, where that is chosen.
     pub sync_window: Option<Span>,
     /// Ports whose link was lost open by order only.
@@ -78,6 +81,7 @@ impl Default for PlanOptions {
             mailbox_states: false,
             presence: true,
             outputs_shift: None,
+            inputs_shift_ns: None,
             sync_window: None,
             ports_open_by_order: false,
         }
@@ -186,6 +190,7 @@ impl Plan {
         let mut plan = Self {
             devices: devices.iter().zip(0..).map(|(planned, id)| device(planned, id)).collect(),
             outputs_shift: options.outputs_shift,
+            inputs_shift_ns: options.inputs_shift_ns,
             sync_window: options.sync_window,
             ports_open_by_order: options.ports_open_by_order,
             ..Self::empty(tree)
@@ -243,6 +248,7 @@ fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
         settings: planned.settings.clone(),
         ebus_current_ma: planned.profile.ebus_current_ma,
         ports: planned.profile.ports,
+        sync_times: planned.profile.sync_times,
         ..DevicePlan::bare(DeviceId(id))
     }
 }
