@@ -15,6 +15,7 @@ pub mod reference;
 pub mod settings;
 mod shift;
 pub mod task;
+pub mod timing;
 pub mod variable;
 
 #[cfg(test)]
