@@ -16,6 +16,8 @@ const INTEGRAL: i64 = 512;
 const MOST: i64 = 100;
 /// Further off than this part of a cycle it is not followed but taken over: 1/10.
 const JUMP: i64 = 10;
+/// So many frames in a row have to be as far off: one that this computer sent late says nothing of the clocks.
+const FAR_OFF: u32 = 3;
 
 /// The controller. Without a reference clock that was set it does nothing.
 #[derive(Clone, Copy, Debug, Default)]
@@ -27,6 +29,8 @@ pub(super) struct DcServo {
     time: Option<(Instant, i64)>,
     /// What the cycle is too short, in 1/512 ns.
     speed: i64,
+    /// Frames in a row that were further off than is followed.
+    far_off: u32,
 }
 
 impl DcServo {
@@ -50,11 +54,17 @@ impl DcServo {
         let cycle = i64::try_from(cycle.as_nanos()).unwrap_or(i64::MAX).max(1);
         let phase = time.rem_euclid(cycle);
         let error = if phase > cycle / 2 { phase - cycle } else { phase };
+        let most = cycle / MOST;
         if is_first || error.abs() > cycle / JUMP {
+            self.far_off += 1;
+            if !is_first && self.far_off < FAR_OFF {
+                return (self.speed / INTEGRAL).clamp(-most, most);
+            }
+            self.far_off = 0;
             // Later, never earlier: what is past cannot be sent.
             return (-error).rem_euclid(cycle);
         }
-        let most = cycle / MOST;
+        self.far_off = 0;
         self.speed = (self.speed - error).clamp(-most * INTEGRAL, most * INTEGRAL);
         (self.speed / INTEGRAL - error / PROPORTIONAL).clamp(-most, most)
     }
@@ -96,5 +106,26 @@ mod tests {
             now += 1_000_000 + moved;
         }
         assert!(worst < 50, "{worst} ns off");
+    }
+
+    #[test]
+    fn single_frame_that_left_late_does_not_move_the_cycle_and_three_in_a_row_do() {
+        let cycle = Span::ms(1);
+        let mut servo = DcServo::default();
+        servo.set_base(Some((1, DcTime(0))));
+        let mut at = |ms: u64, late: u64| {
+            let came = ms * 1_000_000 + late;
+            servo.correction(Instant::from_nanos(came), &(came as u32).to_le_bytes(), cycle)
+        };
+        assert_eq!(at(1, 0), 0, "the first");
+        for ms in 2..20 {
+            assert_eq!(at(ms, 0), 0, "in time");
+        }
+        assert_eq!(
+            [at(20, 200_000), at(21, 0), at(22, 200_000), at(23, 200_000), at(24, 0)],
+            [0; 5]
+        );
+        assert_eq!([at(25, 200_000), at(26, 200_000)], [0; 2]);
+        assert_eq!(at(27, 200_000), 800_000, "three in a row: it is the cycle that is off");
     }
 }
