@@ -86,7 +86,7 @@ impl SubDeviceSupervisor<'_> {
                 clocks::ready(context).await;
                 clocks::set_one(context, device.id).await;
                 if let Some(settings) = &device.settings.clock {
-                    let shift_ns = context.plan.sync0_shift_ns(device);
+                    let shift_ns = context.plan.sync0_start_ns(device);
                     sync_signal::set(wire, device.station, settings, shift_ns).await?;
                 }
                 if wire.now() > began {

@@ -23,5 +23,6 @@ mod software;
 mod start_up;
 mod synchronisation;
 mod tasks;
+mod timing;
 mod watch;
 mod wire_faults;
