@@ -98,7 +98,7 @@ fn gateway_frames() -> Made {
         ("stream", [&upload[..], &empty, &upload, &upload[..7]].concat()),
         ("padded", [&upload[..], &[0; 30]].concat()),
         ("longer-message", too_long.to_vec()),
-        ("other-type", [0x10, 0x10, 1, 2, 3, 4].to_vec()),
+        ("other-type", [0x10, 0x10, 1, 2, 0xFF, 4].to_vec()),
     ]
 }
 
