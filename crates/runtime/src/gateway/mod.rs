@@ -35,7 +35,7 @@ use linesman_proto::time::Instant;
 use self::admission::WAITING;
 pub use self::counts::{GatewayRefusal, GatewayReport};
 pub use self::options::{AllowedHosts, GatewayOptions};
-use self::server::{GatewayRequest, GatewayServer, Unanswered};
+use self::server::{GatewayRequest, GatewayServer, GatewayWaiting};
 use crate::online::{OnlineState, Rates, Snapshot};
 
 /// Messages that are handed to the MainDevice between two frames.
@@ -50,7 +50,7 @@ pub struct MailboxGateway {
     server: Arc<GatewayServer>,
     requests: Receiver<GatewayRequest>,
     /// Messages on their way to SubDevices, and who waits for what answers them.
-    pending: Vec<(ServiceTicket, DeviceId, Unanswered)>,
+    pending: Vec<(ServiceTicket, DeviceId, GatewayWaiting)>,
     rates: Rates,
 }
 

@@ -24,7 +24,7 @@ pub(super) enum GatewayRequest {
         data: Vec<u8>,
         /// What is answered instead, if the SubDevice is there.
         refusal: Option<Vec<u8>>,
-        unanswered: Unanswered,
+        unanswered: GatewayWaiting,
     },
     /// How the line is now; nothing before a plan is run.
     Snapshot(SyncSender<Option<Box<Snapshot>>>),
@@ -33,11 +33,11 @@ pub(super) enum GatewayRequest {
 /// A message to the MainDevice itself.
 pub(super) struct ObjectRequest {
     pub(super) data: Vec<u8>,
-    pub(super) unanswered: Unanswered,
+    pub(super) unanswered: GatewayWaiting,
 }
 
 /// A request that waits for its answer.
-pub(super) struct Unanswered {
+pub(super) struct GatewayWaiting {
     /// Whose it is.
     pub(super) client: u64,
     /// Its mailbox header.
@@ -48,7 +48,7 @@ pub(super) struct Unanswered {
     place: WaitingPlace,
 }
 
-impl Unanswered {
+impl GatewayWaiting {
     /// The mailbox messages that answer it, one behind the other, or why there are none.
     pub(super) fn give(self, outcome: Result<Vec<u8>, GatewayRefusal>) {
         let Self { header, sender, answers, place, .. } = self;
@@ -150,7 +150,7 @@ impl GatewayServer {
         };
         let place = self.clients.place(client).ok_or(GatewayRefusal::TooManyRequests)?;
         let ReturnPath { sender, answers } = back;
-        let unanswered = Unanswered { client: client.id, header, sender, answers, place };
+        let unanswered = GatewayWaiting { client: client.id, header, sender, answers, place };
         let (kind, data) = (header.kind, data.to_vec());
         let asked = if station == 0 {
             if kind != MailboxType::Coe {
