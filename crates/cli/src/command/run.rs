@@ -342,7 +342,7 @@ fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn Diagnosis
 }
 
 /// What runs beside the line.
-type Beside =
+type RunCompanions =
     (Option<ServiceSocket>, Option<MailboxGateway>, Option<(BundleRecorder, BundleReceiver)>);
 
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
@@ -352,7 +352,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     wanted: PlanSource,
     options: &SessionOptions,
     image: Option<PathBuf>,
-    (socket, gateway, bundles): Beside,
+    (socket, gateway, bundles): RunCompanions,
     stop: &Stop,
     said: &str,
     mut reporter: RunReporter,
