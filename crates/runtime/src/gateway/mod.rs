@@ -2,9 +2,9 @@
 //! the MainDevice itself.
 //!
 //! Reference: ETG.8200; ETG.1510 for the objects of the MainDevice. Threads of their own talk to clients
-//! ([`udp`], [`tcp`]); [`server`] says what is taken of them, within the limits of [`admission`] and [`screen`]. The
+//! (`udp`, `tcp`); `server` says what is taken of them, within the limits of `admission` and `screen`. The
 //! thread that runs the line only hands messages to the MainDevice, and hands back what came of them: [`MailboxGateway`].
-//! Messages to address 0 are answered from the [`objects`] of the MainDevice.
+//! Messages to address 0 are answered from the `objects` of the MainDevice.
 //!
 //! A client's counter is its own, and comes back in the answer; towards the SubDevice the MainDevice counts. What
 //! cannot be served is not answered, as the specification has it.
