@@ -11,6 +11,7 @@ mod diagnosis;
 mod eni;
 mod esi;
 mod frame;
+mod gateway;
 mod mailbox;
 mod mailbox_client;
 mod observation_file;
@@ -28,6 +29,7 @@ pub use diagnosis::diagnosis;
 pub use eni::eni;
 pub use esi::esi;
 pub use frame::frame;
+pub use gateway::gateway;
 pub use mailbox::mailbox;
 pub use mailbox_client::mailbox_client;
 pub use observation_file::observation_file;
@@ -49,6 +51,7 @@ pub const TARGETS: &[Target] = &[
     ("eni", eni),
     ("esi", esi),
     ("frame", frame),
+    ("gateway", gateway),
     ("mailbox", mailbox),
     ("mailbox_client", mailbox_client),
     ("observation_file", observation_file),

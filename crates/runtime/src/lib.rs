@@ -5,7 +5,8 @@
 //! asks SubDevices there, [`host_watch`] asks about a card, [`record`] writes what was seen to a file, [`ring_recorder`] to a ring of files. [`serve`] puts a segment on real
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`truth_writer`] writes down what really happened, [`names`] says where. [`plan_file`] reads
-//! the file that a line is planned with, [`named_files`] the files that a file names. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop,
+//! the file that a line is planned with, [`named_files`] the files that a file names. [`gateway`] passes mailbox messages
+//! of other programs to a line that runs. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop,
 //! [`part`] says that a part of a command has failed.
 
 pub mod bundle;
@@ -15,6 +16,7 @@ mod control_socket;
 pub mod drive;
 #[cfg(feature = "event-log")]
 pub mod event_log;
+pub mod gateway;
 pub mod host_watch;
 pub mod listen;
 pub mod named_files;

@@ -57,7 +57,7 @@ fn driven<L: Transport<Error = LinkError>>(
         diagnose: Some(Setup::default()),
     };
     let (notes, told) = sync_channel(NOTES);
-    let beside = RunControls { stop: &Stop::default(), notes, socket: None };
+    let beside = RunControls { stop: &Stop::default(), notes, socket: None, gateway: None };
     let wanted = PlanChoices::default().as_found();
     (run_observed(line, wanted, application, &options, beside, observer), told)
 }

@@ -40,6 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("device_builder", [images()?, descriptions()].concat()),
         ("esi", descriptions()),
         ("sii", images()?),
+        ("gateway", gateway_frames()),
         ("mailbox", messages().into_iter().chain(conversations()).collect()),
         ("mailbox_client", hostile()),
         ("capture", captures),
@@ -83,6 +84,22 @@ fn frames() -> Result<Made, Box<dyn Error>> {
     cut.truncate(90);
     frames.push(("cut-off", cut));
     Ok(frames)
+}
+
+/// Frames of the mailbox gateway: one, several behind each other, and what is wrong with them.
+fn gateway_frames() -> Made {
+    let upload =
+        [0x10, 0x50, 0x0A, 0, 0xE9, 0x03, 0, 0x23, 0, 0x20, 0x41, 0x80, 0xF9, 0x02, 0, 0, 0, 0];
+    let empty = [0x06, 0x50, 0, 0, 0, 0, 0, 0x1F];
+    let mut too_long = upload;
+    too_long[2] = 0x0B;
+    vec![
+        ("upload", upload.to_vec()),
+        ("stream", [&upload[..], &empty, &upload, &upload[..7]].concat()),
+        ("padded", [&upload[..], &[0; 30]].concat()),
+        ("longer-message", too_long.to_vec()),
+        ("other-type", [0x10, 0x10, 1, 2, 0xFF, 4].to_vec()),
+    ]
 }
 
 /// Conditions on frames, each with a frame behind it, with the record of a capture probe or without.

@@ -1,5 +1,6 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
+mod gateway;
 mod reporter;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::bundle::{BundleReceiver, BundleRecorder, RecordedEngine};
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
+use linesman_runtime::gateway::MailboxGateway;
 use linesman_runtime::online::OnlineState;
 use linesman_runtime::plan_file::PlanFile;
 use linesman_runtime::run::diagnosis_thread::DiagnosisObserver;
@@ -33,6 +35,7 @@ use linesman_runtime::stop::Stop;
 use linesman_runtime::system_log::SystemLog;
 use linesman_runtime::transport::{Cards, Pace, Transport};
 
+use self::gateway::GatewayArguments;
 use self::reporter::{Logs, RunReporter};
 use super::bundle::recording::{self, BundleArguments};
 use super::line_access;
@@ -117,6 +120,8 @@ pub(crate) struct Arguments {
     /// Open a socket for service commands beside the run; it is there once the line is being driven
     #[arg(long, value_name = "SOCKET")]
     control: Option<PathBuf>,
+    #[command(flatten)]
+    gateway: GatewayArguments,
     #[command(flatten)]
     bundles: BundleArguments,
     /// Do not judge the line meanwhile
@@ -234,6 +239,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let mut line = Cards::open(names, clock)?;
             line.set_spin(arguments.spin_us);
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
+            let gateway = arguments.gateway.open(line.wake_handle(), online.clone())?;
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
@@ -242,7 +248,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             });
             let options = with_source(options, real_time, began.rfc3339());
             let bundles = arguments.bundles.start(began, names)?;
-            let beside = (socket, bundles);
+            let beside = (socket, gateway, bundles);
             drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
         }
         Selector::Segment(path) => {
@@ -250,6 +256,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let pace = if lasts.is_some() { Pace::Free } else { Pace::Host };
             let line = line_access::virtual_line(path, pace)?;
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
+            let gateway = arguments.gateway.open(line.wake_handle(), online.clone())?;
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
             let mut options = options;
             if let Some(setup) = &mut options.diagnose {
@@ -257,7 +264,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             }
             // A virtual run has no date.
             let bundles = arguments.bundles.start(UnixTime::EPOCH, &[])?;
-            let beside = (socket, bundles);
+            let beside = (socket, gateway, bundles);
             drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
         }
         Selector::Listen(_) | Selector::File(_) => {
@@ -334,6 +341,10 @@ fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn Diagnosis
     }
 }
 
+/// What runs beside the line.
+type RunCompanions =
+    (Option<ServiceSocket>, Option<MailboxGateway>, Option<(BundleRecorder, BundleReceiver)>);
+
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
 fn drive<L: Transport<Error = LinkError> + Send>(
@@ -341,13 +352,16 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     wanted: PlanSource,
     options: &SessionOptions,
     image: Option<PathBuf>,
-    (socket, bundles): (Option<ServiceSocket>, Option<(BundleRecorder, BundleReceiver)>),
+    (socket, gateway, bundles): RunCompanions,
     stop: &Stop,
     said: &str,
     mut reporter: RunReporter,
     output: &mut Output,
 ) -> Result<Status, Failure> {
     reporter.line(said, output);
+    if let Some(gateway) = &gateway {
+        reporter.line(&gateway::opened(gateway), output);
+    }
     let (notes, told) = mpsc::sync_channel(NOTES);
     let socket_watch = socket.as_ref().map(ServiceSocket::watch);
     let (recorder, news) = bundles.unzip();
@@ -361,7 +375,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
         }
     };
     let ended = std::thread::scope(|scope| {
-        let beside = RunControls { stop, notes, socket };
+        let beside = RunControls { stop, notes, socket, gateway };
         let judge = move |setup| observer(setup, recorder);
         let work = move || match image {
             None => running::run_observed(line, wanted, Idle, options, beside, judge),

@@ -38,6 +38,7 @@ mod files;
 mod findings;
 mod foreign_recordings;
 mod frame_faults;
+mod gateway;
 mod hints;
 mod host;
 mod hostile;

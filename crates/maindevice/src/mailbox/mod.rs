@@ -2,7 +2,7 @@
 //!
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
 //! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information`,
-//! `foe` and `settings` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
+//! `foe`, `settings` and `pass` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
 //! another. Emergencies and messages that nobody asked for become events; what went wrong is kept
 //! ([`ProtocolErrors`]).
 
@@ -12,6 +12,7 @@ mod foe;
 mod information;
 mod mapped;
 pub(crate) mod multiplexer;
+mod pass;
 mod protocol_errors;
 pub(crate) mod queue;
 mod request;
@@ -19,7 +20,7 @@ mod settings;
 pub(crate) mod transaction;
 
 use linesman_proto::address::DeviceId;
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
 use crate::executor::lock;
 use crate::supervisor::Context;
@@ -36,6 +37,35 @@ pub(crate) use queue::{MailboxJob, MailboxQueues, Outcome};
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long.
 const UNHEARD: Span = Span::s(1);
 
+/// So long after a message of a transfer a SubDevice is kept for the client of the mailbox gateway whose transfer it
+/// is.
+const KEPT_FOR_CLIENT: Span = Span::s(1);
+/// After so long others have their turn, whatever is under way.
+const LONGEST_TRANSFER: Span = Span::s(60);
+
+/// A client of the mailbox gateway that a SubDevice is kept for, as its transfer takes several messages.
+#[derive(Clone, Copy, Debug)]
+struct KeptFor {
+    client: u64,
+    since: Instant,
+    until: Instant,
+}
+
+impl KeptFor {
+    /// The client, if a message of it was passed on and more of its transfer is to come.
+    fn after(
+        before: Option<Self>,
+        client: Option<u64>,
+        under_way: bool,
+        now: Instant,
+    ) -> Option<Self> {
+        let client = client.filter(|_| under_way)?;
+        let since = before.filter(|kept| kept.client == client).map_or(now, |kept| kept.since);
+        let until = (now + KEPT_FOR_CLIENT).min(since + LONGEST_TRANSFER);
+        Some(Self { client, since, until })
+    }
+}
+
 /// Serves the mailbox of one SubDevice; never ends.
 pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let plan = std::sync::Arc::clone(&context.plan);
@@ -43,12 +73,17 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let (wire, mailboxes) = (&context.wire, &context.mailboxes);
     let Some(mut multiplexer) = Multiplexer::new(wire, mailboxes, device) else { return };
     let mut openings = 0;
+    let mut kept_for: Option<KeptFor> = None;
     loop {
+        let now = context.wire.now();
+        kept_for = kept_for.filter(|kept| now < kept.until);
         let interval = match mailboxes.is_mapped(id) {
             true => context.options.mailbox_interval.max(UNHEARD),
             false => context.options.mailbox_interval,
         };
-        let job = mailboxes.next(id, context.wire.sleep(interval)).await;
+        let interval = kept_for.map_or(interval, |kept| interval.min(kept.until.since(now)));
+        let client = kept_for.map(|kept| kept.client);
+        let job = mailboxes.next(id, client, context.wire.sleep(interval)).await;
         let (open, boots, now) = {
             let device_table = lock(&context.device_table);
             (
@@ -64,7 +99,12 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
         }
         let open = open && multiplexer.set_boots(boots);
         match job {
-            Some(job) => work(&context, &mut multiplexer, job, open).await,
+            Some(job) => {
+                let client = job.request.client();
+                work(&context, &mut multiplexer, job, open).await;
+                let (under_way, now) = (multiplexer.is_passing(), context.wire.now());
+                kept_for = KeptFor::after(kept_for, client, under_way, now);
+            }
             None if open => multiplexer.drain().await,
             // What is left of an earlier run is of no interest, and must not be looked at for ever.
             None => {
@@ -81,7 +121,10 @@ async fn work(context: &Context, multiplexer: &mut Multiplexer, job: MailboxJob,
         let (id, operation) = (job.id, job.request.operation());
         Err(MailboxFailure { id, operation, step: Step::Before, why: Why::NotOpen })
     };
-    context.mailboxes.note(job.id, context.wire.now(), &job.request, &outcome);
+    // What others ask for in vain is no trouble of the SubDevice.
+    if job.request.client().is_none() {
+        context.mailboxes.note(job.id, context.wire.now(), &job.request, &outcome);
+    }
     job.done(outcome);
 }
 

@@ -13,6 +13,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::MailboxQueues;
 use super::failure::Why;
+use super::pass::PassedTransfer;
 use crate::event::Event;
 use crate::exchange::{ExchangeError, Request, Target};
 use crate::executor::Wire;
@@ -53,6 +54,8 @@ pub(crate) struct Multiplexer {
     late: bool,
     /// What came during this operation that is no message: how often, and the last of it in words.
     rubbish: Option<(u32, String)>,
+    /// The transfer of a client of the mailbox gateway.
+    pub(super) passed: PassedTransfer,
 }
 
 impl Multiplexer {
@@ -73,6 +76,7 @@ impl Multiplexer {
             fetched_again: false,
             late: false,
             rubbish: None,
+            passed: PassedTransfer::default(),
         })
     }
 
@@ -80,6 +84,7 @@ impl Multiplexer {
     pub(crate) fn reset(&mut self) {
         (self.sent, self.received) = (None, Counter::NONE);
         (self.fetched_again, self.late) = (false, false);
+        self.passed = PassedTransfer::default();
     }
 
     /// It is the mailbox of BOOT from now on, or that of all other states. False when it has none
@@ -88,6 +93,11 @@ impl Multiplexer {
         let areas = if boots { self.bootstrap } else { Some(self.standard) };
         self.areas = areas.unwrap_or(self.standard);
         areas.is_some()
+    }
+
+    /// True if a transfer of a client of the mailbox gateway is under way.
+    pub(crate) fn is_passing(&self) -> bool {
+        self.passed.under_way
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -342,7 +352,9 @@ impl Multiplexer {
                 Ok(_) => {}
                 Err(error) => self.found_rubbish(error.to_string()),
             },
-            MailboxType::Foe if wanted == Some(kind) => return Ok(Some(message.data.to_vec())),
+            MailboxType::Foe | MailboxType::Aoe | MailboxType::Voe if wanted == Some(kind) => {
+                return Ok(Some(message.data.to_vec()));
+            }
             // Frames and time stamps come unasked at any time.
             MailboxType::Eoe if wanted == Some(kind) => {
                 if let Ok(eoe::Message::Response { .. }) = eoe::Message::parse(message.data) {

@@ -97,6 +97,17 @@ struct MailboxQueue {
     full: bool,
 }
 
+impl MailboxQueue {
+    /// The next job; with a client, its next one.
+    fn take(&mut self, kept_for: Option<u64>) -> Option<MailboxJob> {
+        let at = match kept_for {
+            None => 0,
+            Some(_) => self.jobs.iter().position(|job| job.request.client() == kept_for)?,
+        };
+        self.jobs.remove(at)
+    }
+}
+
 /// The queues of all SubDevices with a mailbox. Clones mean the same queues.
 #[derive(Clone, Default, Debug)]
 pub(crate) struct MailboxQueues {
@@ -135,9 +146,10 @@ impl MailboxQueues {
         Pending { slot }
     }
 
-    /// The next job, or `None` when it is time to look into the mailbox.
-    pub(crate) fn next(&self, id: DeviceId, sleep: Sleep) -> NextJob {
-        NextJob { queues: self.clone(), id, sleep }
+    /// The next job, or `None` when it is time to look into the mailbox. Where the SubDevice is kept for a client of
+    /// the mailbox gateway, only the jobs of that one.
+    pub(crate) fn next(&self, id: DeviceId, kept_for: Option<u64>, sleep: Sleep) -> NextJob {
+        NextJob { queues: self.clone(), id, kept_for, sleep }
     }
 
     /// Waits until a mailbox is seen to hold something, at most so long.
@@ -207,6 +219,7 @@ impl MailboxQueues {
 pub(crate) struct NextJob {
     queues: MailboxQueues,
     id: DeviceId,
+    kept_for: Option<u64>,
     sleep: Sleep,
 }
 
@@ -215,7 +228,7 @@ impl Future for NextJob {
 
     fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Option<MailboxJob>> {
         if let Some(queue) = lock(&self.queues.queues).get_mut(&self.id) {
-            if let Some(job) = queue.jobs.pop_front() {
+            if let Some(job) = queue.take(self.kept_for) {
                 return Poll::Ready(Some(job));
             }
             if queue.full {

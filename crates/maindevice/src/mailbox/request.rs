@@ -80,9 +80,36 @@ pub enum MailboxRequest {
         /// The bytes.
         data: Vec<u8>,
     },
+    /// Pass on a message of a client of the mailbox gateway: the mailbox messages that answer it, each with its
+    /// header, one behind the other; none for a message that is not answered.
+    Pass {
+        /// Tells clients apart: while a transfer of one is under way, the SubDevice is kept for it.
+        client: u64,
+        /// The protocol of the message.
+        kind: MailboxType,
+        /// What follows its mailbox header.
+        data: Vec<u8>,
+    },
 }
 
 impl MailboxRequest {
+    /// The client of the mailbox gateway whose message it is; `None` for a request of our own.
+    #[must_use]
+    pub(crate) const fn client(&self) -> Option<u64> {
+        match self {
+            Self::Pass { client, .. } => Some(*client),
+            Self::Upload { .. }
+            | Self::Download { .. }
+            | Self::ObjectList { .. }
+            | Self::DescribeObject { .. }
+            | Self::DescribeEntry { .. }
+            | Self::SetAddresses { .. }
+            | Self::WriteIdn { .. }
+            | Self::ReadFile { .. }
+            | Self::WriteFile { .. } => None,
+        }
+    }
+
     /// What is to be done, without data and password.
     #[must_use]
     pub fn operation(&self) -> MailboxOperation {
@@ -104,6 +131,7 @@ impl MailboxRequest {
             }
             Self::ReadFile { name, .. } => MailboxOperation::ReadFile { name: name.clone() },
             Self::WriteFile { name, .. } => MailboxOperation::WriteFile { name: name.clone() },
+            Self::Pass { kind, .. } => MailboxOperation::Pass { protocol: *kind },
         }
     }
 }
@@ -162,6 +190,11 @@ pub enum MailboxOperation {
         /// Which.
         name: String,
     },
+    /// Passing on a message of a client of the mailbox gateway.
+    Pass {
+        /// Its protocol.
+        protocol: MailboxType,
+    },
 }
 
 impl MailboxOperation {
@@ -177,6 +210,7 @@ impl MailboxOperation {
             Self::SetAddresses { .. } => MailboxType::Eoe,
             Self::WriteIdn { .. } => MailboxType::Soe,
             Self::ReadFile { .. } | Self::WriteFile { .. } => MailboxType::Foe,
+            Self::Pass { protocol } => *protocol,
         }
     }
 }
@@ -200,6 +234,9 @@ impl fmt::Display for MailboxOperation {
             Self::WriteIdn { drive, idn } => write!(f, "writing {idn} of drive {drive}"),
             Self::ReadFile { name } => write!(f, "reading file `{name}`"),
             Self::WriteFile { name } => write!(f, "writing file `{name}`"),
+            Self::Pass { protocol } => {
+                write!(f, "passing on a message of {protocol} for a client of the mailbox gateway")
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use linesman_proto::time::{Instant, Span};
 use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
 use super::request::MailboxRequest;
-use super::{coe, foe, information, settings};
+use super::{coe, foe, information, pass, settings};
 
 /// A SubDevice that writes what it got into its flash memory answers late: a file takes more patience
 /// than an object.
@@ -82,6 +82,7 @@ impl MailboxTransaction<'_> {
             MailboxRequest::WriteFile { name, password, data } => {
                 foe::write(self, name, *password, data).await.map(|()| Vec::new())
             }
+            MailboxRequest::Pass { kind, data, .. } => pass::pass(self, *kind, data).await,
         }
     }
 

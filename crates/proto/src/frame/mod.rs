@@ -45,4 +45,15 @@ impl FrameType {
             other => Self::Other(other),
         }
     }
+
+    /// The value of the four-bit field.
+    #[must_use]
+    pub const fn bits(self) -> u8 {
+        match self {
+            Self::Datagrams => 1,
+            Self::NetworkVariables => 4,
+            Self::Mailbox => 5,
+            Self::Other(other) => other & 0x0F,
+        }
+    }
 }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bring_up::BringUpReport;
 use super::real_time::GrantedRealTime;
+use crate::gateway::GatewayReport;
 use crate::serve::lateness::LatenessReport;
 
 /// Name and version of the format.
@@ -47,6 +48,9 @@ pub struct RunReport {
     pub lateness: LatenessReport,
     /// What the host granted.
     pub host: HostReport,
+    /// What went through the mailbox gateway; `null`: there is none.
+    #[serde(default)]
+    pub gateway: Option<GatewayReport>,
     /// Parts of this program that failed while the line was driven on, each with the reason and the next step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed: Vec<String>,

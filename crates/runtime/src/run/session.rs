@@ -20,6 +20,7 @@ use super::diagnosis_thread::DiagnosisObserver;
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
+use crate::gateway::MailboxGateway;
 use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
 use crate::service::ServiceSocket;
@@ -63,6 +64,7 @@ pub struct RunSession<A> {
     untold: Arc<AtomicU64>,
     lateness: Lateness,
     socket: Option<ServiceSocket>,
+    gateway: Option<MailboxGateway>,
     /// Left-out frames that were told, and nothing of more before that time.
     missed_told: (u64, Instant),
     begun_at: Instant,
@@ -125,13 +127,17 @@ impl<A: Application> RunSession<A> {
             },
             lateness: self.lateness.report(),
             host: (&self.granted).into(),
+            gateway: self.gateway.as_ref().map(MailboxGateway::report),
             failed: Vec::new(),
             diagnosis: None,
         }
     }
 
-    /// Takes what is asked for through the socket.
+    /// Takes what is asked for through the socket and the mailbox gateway.
     fn attend(&mut self, now: Instant, main: &mut MainDevice) {
+        if let Some(gateway) = &mut self.gateway {
+            gateway.turn(now, main);
+        }
         let Some(mut socket) = self.socket.take() else { return };
         socket.turn(now, main, |main| self.report(now, main));
         self.socket = Some(socket);
@@ -162,6 +168,9 @@ impl<A: Application> SessionHooks for RunSession<A> {
         if let Event::Served { ticket, result, .. } = &event {
             if let Some(socket) = &mut self.socket {
                 socket.served(*ticket, result);
+            }
+            if let Some(gateway) = &mut self.gateway {
+                gateway.served(*ticket, result);
             }
             self.run.application_mut().served(*ticket, result);
             return;
@@ -213,6 +222,8 @@ pub struct RunControls<'a> {
     pub notes: SyncSender<Note>,
     /// Services for single SubDevices, asked for through a socket.
     pub socket: Option<ServiceSocket>,
+    /// Mailbox messages of other programs.
+    pub gateway: Option<MailboxGateway>,
 }
 
 /// Runs a line until its time is over, `stop`, or the application has enough; then stops it: outputs

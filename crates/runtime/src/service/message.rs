@@ -3,6 +3,7 @@
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer};
 use linesman_proto::address::RegisterAddress;
+use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use linesman_proto::mailbox::soe::Idn;
@@ -94,6 +95,8 @@ pub enum Asked {
         password: u32,
         data: String,
     },
+    /// Pass on a message of a client of the mailbox gateway, by the number of its protocol.
+    Pass { client: u64, protocol: u8, data: String },
     /// Look at its state.
     State,
     /// Take it to a state, by its number: 1, 2, 3, 4 or 8.
@@ -277,6 +280,9 @@ impl From<&MailboxRequest> for Asked {
                 let (name, data) = (name.clone(), to_hex(data));
                 Self::WriteFile { name, password: *password, data }
             }
+            MailboxRequest::Pass { client, kind, data } => {
+                Self::Pass { client: *client, protocol: kind.code(), data: to_hex(data) }
+            }
         }
     }
 }
@@ -322,6 +328,10 @@ impl Asked {
             Self::WriteFile { name, password, data } => {
                 let data = from_hex(&data)?;
                 Service::Mailbox(MailboxRequest::WriteFile { name, password, data })
+            }
+            Self::Pass { client, protocol, data } => {
+                let (kind, data) = (MailboxType::from_code(protocol), from_hex(&data)?);
+                Service::Mailbox(MailboxRequest::Pass { client, kind, data })
             }
             Self::State => Service::State,
             Self::Enter { state } => Service::Enter(known(state)?),
@@ -381,6 +391,11 @@ mod tests {
             Service::Mailbox(MailboxRequest::DescribeEntry { object, values: ValueInfo(0x10) }),
             Service::Mailbox(MailboxRequest::ReadFile { name: name.clone(), password }),
             Service::Mailbox(MailboxRequest::WriteFile { name, password, data: data.clone() }),
+            Service::Mailbox(MailboxRequest::Pass {
+                client: 3,
+                kind: MailboxType::Voe,
+                data: data.clone(),
+            }),
             Service::State,
             Service::Enter(AlState::Boot),
             Service::Acknowledge,

@@ -368,6 +368,9 @@ pub(super) fn summary(report: &RunReport, paint: Paint) -> String {
     for refused in &host.refused {
         text.push_str(&format!("Not granted: {refused}\n"));
     }
+    if let Some(gateway) = &report.gateway {
+        text.push_str(&super::gateway::summary(gateway));
+    }
     text
 }
 

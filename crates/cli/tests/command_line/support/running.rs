@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::os::unix::net::UnixStream;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -32,6 +34,17 @@ impl Running {
     /// The same of a plant of this project, with these files beside it.
     #[track_caller]
     pub(crate) fn with(plant: &str, files: &[(&str, &str)]) -> Self {
+        Self::run(plant, files, &[])
+    }
+
+    /// The same of a plant as it is, with these options of the command.
+    #[track_caller]
+    pub(crate) fn with_options(plant: &str, options: &[&str]) -> Self {
+        Self::run(plant, &[], options)
+    }
+
+    #[track_caller]
+    fn run(plant: &str, files: &[(&str, &str)], options: &[&str]) -> Self {
         let folder = TempDir::new().unwrap();
         let file = folder.path().join("plant.toml");
         std::fs::write(&file, plant).unwrap();
@@ -47,6 +60,7 @@ impl Running {
             .args(project)
             .args(["--on", &format!("sim:{}", file.display()), "--control"])
             .arg(folder.path().join("socket"))
+            .args(options)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -63,6 +77,17 @@ impl Running {
     /// Its socket.
     pub(crate) fn socket(&self) -> String {
         self.folder.path().join("socket").display().to_string()
+    }
+
+    /// How it goes, as its socket tells.
+    #[track_caller]
+    pub(crate) fn status(&self) -> Value {
+        let mut stream = UnixStream::connect(self.socket()).unwrap();
+        stream.write_all(b"{\"do\":\"status\"}\n").unwrap();
+        let mut line = String::new();
+        BufReader::new(stream).read_line(&mut line).unwrap();
+        let answer: Value = serde_json::from_str(&line).unwrap();
+        answer["run"].clone()
     }
 
     /// What `linesman online` reports of it, once that is as expected; on a busy computer that takes a while.

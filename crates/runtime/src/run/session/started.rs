@@ -65,7 +65,7 @@ pub fn start_observed<'a, L: Transport<Error = LinkError>, A: Application>(
     beside: RunControls<'a>,
     observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
 ) -> Result<StartedRun<'a, L, A>, RunError> {
-    let RunControls { stop, notes, socket } = beside;
+    let RunControls { stop, notes, socket, gateway } = beside;
     let untold = Arc::<AtomicU64>::default();
     let observer = options.diagnose.clone().map(observer);
     let (diagnosis, judging) = match observer {
@@ -95,6 +95,7 @@ pub fn start_observed<'a, L: Transport<Error = LinkError>, A: Application>(
         untold,
         lateness: Lateness::default(),
         socket,
+        gateway,
         missed_told: (0, Instant::ZERO),
         begun_at,
         granted,

@@ -18,7 +18,8 @@ pub(super) fn answer(
     dictionary: &Dictionary,
     room: usize,
 ) -> Result<Answers, ErrorReplyCode> {
-    let mut buffer = vec![0; LARGEST];
+    // A list has a word of its kind and one for each object.
+    let mut buffer = vec![0; LARGEST.max(2 + 2 * dictionary.objects().count())];
     let (to, answer) = match question.body {
         Body::ListRequest { list } => (Answer::List, object_list(list, dictionary, &mut buffer)),
         Body::ObjectRequest { index } => (Answer::Object, object(index, dictionary, &mut buffer)),

@@ -8,6 +8,7 @@ mod coe;
 mod eoe;
 mod foe;
 mod information;
+mod object_server;
 mod outbox;
 mod soe;
 
@@ -24,6 +25,7 @@ use linesman_proto::time::{Instant, Span};
 use self::coe::CoeServer;
 use self::eoe::EoePort;
 use self::foe::FoeServer;
+pub use self::object_server::ObjectServer;
 use self::outbox::{Envelope, Outbox};
 use super::dictionary::Dictionary;
 use super::files::Files;
