@@ -4,6 +4,7 @@
 pub(crate) mod report;
 mod segment;
 mod table;
+mod timing;
 
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,7 @@ use linesman_proto::time::Span;
 use linesman_runtime::plan_file::{PlanFile, PlanFileError};
 
 use crate::amount::cycle;
+use crate::drawing::CyclePlot;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -22,7 +24,8 @@ use crate::output::Output;
 #[derive(clap::Args, Debug)]
 #[command(
     after_help = "Exit status: 0 nothing is doubtful, 1 there is a warning or an error, 2 no plan can be \
-                  made of the file."
+                  made of the file; with \
+                  `--timing` also 1 a SubDevice is not in time, 3 one could not be judged."
 )]
 pub(crate) struct Arguments {
     /// A project (TOML) or a network configuration of another tool (ENI, XML)
@@ -43,6 +46,8 @@ pub(crate) struct Arguments {
     /// Write a virtual segment made of the plan, to run on it; its descriptions go beside it
     #[arg(long, value_name = "SEGMENT.toml")]
     segment: Option<PathBuf>,
+    #[command(flatten)]
+    timing: timing::TimingArguments,
     /// JSON, schema linesman.plan/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -50,7 +55,10 @@ pub(crate) struct Arguments {
 
 /// Makes the plan and shows it.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    for path in [&arguments.export, &arguments.segment, &arguments.save].into_iter().flatten() {
+    for path in [&arguments.export, &arguments.segment, &arguments.save, &arguments.timing.svg]
+        .into_iter()
+        .flatten()
+    {
         files::refuse_to_overwrite(path)?;
     }
     if arguments.save.is_some() && !files::is_xml(&arguments.file)? {
@@ -59,10 +67,21 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     let file = PlanFile::open_with(&arguments.file, arguments.cycle_us)?;
     let doubts = file.plan.doubts();
+    let options = arguments.timing.options(&file.plan)?;
+    let timing = arguments.timing.timing.then(|| file.plan.timing(&options));
+    let plot = timing.as_ref().map(|timing| CyclePlot::new(&file.plan, timing, &options));
     if arguments.json {
-        output.json(&report::report(&file, &doubts));
+        output.json(&report::report(&file, &doubts, timing.as_ref()));
     } else {
         output.text(&table::text(&file, &doubts, arguments.verbose, output));
+    }
+    if let (Some(timing), Some(plot)) = (&timing, &plot) {
+        if !arguments.json {
+            output.text(&timing::text(&file.plan, timing, plot, output));
+        }
+        if let Some(path) = &arguments.timing.svg {
+            files::write_new(path, "the drawing", &plot.file())?;
+        }
     }
     if let Some(path) = &arguments.export {
         let text = eni::write(&file.name, &file.plan);
@@ -78,7 +97,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         save(path, &arguments.file, arguments.json, output)?;
     }
     let bad = doubts.iter().any(|doubt| doubt.severity >= Severity::Warning);
-    Ok(if bad { Status::Findings } else { Status::Good })
+    let proven = timing.as_ref().map_or(Status::Good, timing::status);
+    Ok(if bad { Status::Findings } else { proven })
 }
 
 /// Writes the project that an ENI makes.

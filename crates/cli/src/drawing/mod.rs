@@ -6,11 +6,13 @@
 //! page.
 
 mod badge;
+mod cycle_plot;
 mod layout;
 mod scene;
 mod svg;
 pub(crate) mod time_axis;
 mod wire;
 
+pub(crate) use cycle_plot::CyclePlot;
 pub(crate) use scene::{Label, Mark, Scene, State};
 pub(crate) use svg::{NARROW, STYLE, WIDE, draw, file};

@@ -75,6 +75,7 @@ mod state_words;
 mod states;
 mod support;
 mod tasks;
+mod timing;
 mod whole_files;
 mod widths;
 mod words;

@@ -1,7 +1,9 @@
 //! A plan as JSON, `linesman.plan/1`.
 
 mod clock;
+pub(super) mod timing;
 
+use linesman_config::plan::timing::Timing;
 use linesman_config::plan::{
     DatagramPlan, DevicePlan, Doubt, FramePlan, IoAt, PathView, Plan, Presence, Role, Severity,
     Task, expect,
@@ -14,6 +16,7 @@ use linesman_runtime::plan_file::PlanFile;
 use serde::Serialize;
 
 use self::clock::ClockReport;
+use self::timing::TimingReport;
 use crate::command::ebus::{self, EbusReport};
 use crate::version;
 
@@ -41,6 +44,8 @@ pub(crate) struct PlanReport {
     ebus: Vec<EbusReport>,
     /// The distributed clocks; `null` without any.
     clock: Option<ClockReport>,
+    /// The timing of SubDevices with SYNC0; `null` unless asked for (`--timing`).
+    timing: Option<TimingReport>,
     /// What is doubtful, the worst first.
     findings: Vec<FindingReport>,
     /// What the file says and the plan leaves out.
@@ -204,7 +209,7 @@ struct FindingReport {
 }
 
 /// The report of a plan.
-pub(super) fn report(file: &PlanFile, doubts: &[Doubt]) -> PlanReport {
+pub(super) fn report(file: &PlanFile, doubts: &[Doubt], timing: Option<&Timing>) -> PlanReport {
     let plan = &file.plan;
     let present = Presence::full(plan.devices.len());
     let mut number = 0..;
@@ -236,6 +241,7 @@ pub(super) fn report(file: &PlanFile, doubts: &[Doubt]) -> PlanReport {
             plan.device(id).map_or_else(String::new, |device| device.name.clone())
         }),
         clock: clock::of(plan),
+        timing: timing.map(|timing| timing::of(plan, timing)),
         findings: doubts.iter().map(finding).collect(),
         notes: file.notes.clone(),
     }
