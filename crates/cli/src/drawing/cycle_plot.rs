@@ -3,7 +3,7 @@
 //!
 //! Reference: S0 L447-475, L611-637. A frame that fetches inputs earlier stands where it is (SYN-29).
 
-use linesman_config::plan::timing::{CycleTimes, Timing, TimingOptions, TimingVerdict};
+use linesman_config::plan::timing::{CycleTimes, PlanTiming, TimingOptions, TimingVerdict};
 use linesman_config::plan::{IoAt, Plan};
 use linesman_proto::time::Span;
 use maud::{Markup, PreEscaped, html};
@@ -89,7 +89,7 @@ pub(crate) struct CyclePlot {
 
 impl CyclePlot {
     /// The plot of what was found of a plan.
-    pub(crate) fn new(plan: &Plan, timing: &Timing, options: &TimingOptions) -> Self {
+    pub(crate) fn new(plan: &Plan, timing: &PlanTiming, options: &TimingOptions) -> Self {
         let tasks = (0..plan.tasks.len()).map(|task| task_lane(plan, timing, options, task));
         let devices = timing.devices.iter().map(|device| {
             let planned = plan.device(device.device);
@@ -217,7 +217,7 @@ fn signed(span: Span) -> i64 {
 }
 
 /// A task: its frames at the reference clock, and its program before or behind them.
-fn task_lane(plan: &Plan, timing: &Timing, options: &TimingOptions, number: usize) -> Lane {
+fn task_lane(plan: &Plan, timing: &PlanTiming, options: &TimingOptions, number: usize) -> Lane {
     let task = &plan.tasks[number];
     let begins = plan.cycle_begin_ns(task);
     let frames = timing.frames.iter().filter(|frame| frame.task == number);

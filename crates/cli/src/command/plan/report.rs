@@ -3,7 +3,7 @@
 mod clock;
 pub(super) mod timing;
 
-use linesman_config::plan::timing::Timing;
+use linesman_config::plan::timing::PlanTiming;
 use linesman_config::plan::{
     DatagramPlan, DevicePlan, Doubt, FramePlan, IoAt, PathView, Plan, Presence, Role, Severity,
     Task, expect,
@@ -16,7 +16,7 @@ use linesman_runtime::plan_file::PlanFile;
 use serde::Serialize;
 
 use self::clock::ClockReport;
-use self::timing::TimingReport;
+use self::timing::PlanTimingReport;
 use crate::command::ebus::{self, EbusReport};
 use crate::version;
 
@@ -45,7 +45,7 @@ pub(crate) struct PlanReport {
     /// The distributed clocks; `null` without any.
     clock: Option<ClockReport>,
     /// The timing of SubDevices with SYNC0; `null` unless asked for (`--timing`).
-    timing: Option<TimingReport>,
+    timing: Option<PlanTimingReport>,
     /// What is doubtful, the worst first.
     findings: Vec<FindingReport>,
     /// What the file says and the plan leaves out.
@@ -209,7 +209,7 @@ struct FindingReport {
 }
 
 /// The report of a plan.
-pub(super) fn report(file: &PlanFile, doubts: &[Doubt], timing: Option<&Timing>) -> PlanReport {
+pub(super) fn report(file: &PlanFile, doubts: &[Doubt], timing: Option<&PlanTiming>) -> PlanReport {
     let plan = &file.plan;
     let present = Presence::full(plan.devices.len());
     let mut number = 0..;

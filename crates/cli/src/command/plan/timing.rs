@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use linesman_config::plan::timing::{
-    DeviceTiming, InputsEstimate, RuleTiming, Timing, TimingOptions, TimingVerdict,
+    DeviceTiming, InputsEstimate, PlanTiming, RuleTiming, TimingOptions, TimingVerdict,
 };
 use linesman_config::plan::{Plan, ShiftReference};
 use linesman_proto::time::Span;
@@ -86,7 +86,7 @@ fn execution(text: &str, plan: &Plan) -> Result<(String, Span), Failure> {
 }
 
 /// The status: what is not judged is neither good nor bad.
-pub(super) fn status(timing: &Timing) -> Status {
+pub(super) fn status(timing: &PlanTiming) -> Status {
     match timing.verdict() {
         TimingVerdict::Pass => Status::Good,
         TimingVerdict::Fail => Status::Findings,
@@ -103,7 +103,7 @@ fn span_us(span: Span) -> String {
 }
 
 /// The timing as text.
-pub(super) fn text(plan: &Plan, timing: &Timing, plot: &CyclePlot, output: &Output) -> String {
+pub(super) fn text(plan: &Plan, timing: &PlanTiming, plot: &CyclePlot, output: &Output) -> String {
     let mut text = format!("\n{}: {}\n", output.paint().bold("Timing"), verdict(timing, output));
     text.push_str(&estimates(plan, timing, output));
     if !timing.devices.is_empty() {
@@ -125,7 +125,7 @@ pub(super) fn text(plan: &Plan, timing: &Timing, plot: &CyclePlot, output: &Outp
     text
 }
 
-fn verdict(timing: &Timing, output: &Output) -> String {
+fn verdict(timing: &PlanTiming, output: &Output) -> String {
     let paint = output.paint();
     let of = |verdict| timing.devices.iter().filter(|device| device.verdict == verdict).count();
     let all = timing.devices.len();
@@ -145,7 +145,7 @@ fn verdict(timing: &Timing, output: &Output) -> String {
     }
 }
 
-fn estimates(plan: &Plan, timing: &Timing, output: &Output) -> String {
+fn estimates(plan: &Plan, timing: &PlanTiming, output: &Output) -> String {
     if timing.devices.is_empty() {
         return String::new();
     }
@@ -195,7 +195,7 @@ fn inputs_sum(inputs: &InputsEstimate) -> String {
     )
 }
 
-fn table(plan: &Plan, timing: &Timing, output: &Output) -> String {
+fn table(plan: &Plan, timing: &PlanTiming, output: &Output) -> String {
     let paint = output.paint();
     let headings = [
         "No",
@@ -301,7 +301,7 @@ fn advice(plan: &Plan, device: &DeviceTiming, output: &Output) -> String {
 }
 
 /// The shifts of the network that mend all.
-fn network_advice(timing: &Timing, output: &Output) -> String {
+fn network_advice(timing: &PlanTiming, output: &Output) -> String {
     let mut text = String::new();
     let outputs = timing.outputs_shift.map(|shift| {
         let us = shift.as_nanos() / 1_000;
@@ -321,7 +321,7 @@ fn network_advice(timing: &Timing, output: &Output) -> String {
 }
 
 /// What is assumed of SubDevices, each sentence once with all it is true of.
-fn assumed_of_devices(plan: &Plan, timing: &Timing, output: &Output) -> String {
+fn assumed_of_devices(plan: &Plan, timing: &PlanTiming, output: &Output) -> String {
     let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
     for device in &timing.devices {
         let name = plan.device(device.device).map_or("", |planned| planned.name.as_str());

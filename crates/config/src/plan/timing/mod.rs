@@ -1,7 +1,7 @@
 //! Timing of a plan: whether each SubDevice with SYNC0 gets its outputs in time and has its inputs ready in time,
 //! by how much, and which shift mends it where it does not.
 //!
-//! A calculation: what goes in is the plan and [`TimingOptions`], what comes out is [`Timing`] with the sentences
+//! A calculation: what goes in is the plan and [`TimingOptions`], what comes out is [`PlanTiming`] with the sentences
 //! that tell what was assumed. Nothing passes without evidence: where times of a SubDevice are not known, it is not
 //! judged. Reference: S0 L225-274, L399-475, L611-714.
 
@@ -32,7 +32,7 @@ pub use frame_time::FrameTime;
 
 /// The timing of a plan.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Timing {
+pub struct PlanTiming {
     /// How early and how late the MainDevice sends at the most, as it is reckoned with.
     pub jitter: Span,
     /// The smallest shift of the outputs by rule of thumb.
@@ -51,7 +51,7 @@ pub struct Timing {
     pub assumed: Vec<String>,
 }
 
-impl Timing {
+impl PlanTiming {
     /// What follows for the plan: one that fails decides, then one that was not judged.
     #[must_use]
     pub fn verdict(&self) -> TimingVerdict {
@@ -76,7 +76,7 @@ impl Plan {
 
     /// The timing of all SubDevices with SYNC0 (SYN-06, SYN-27, SYN-28).
     #[must_use]
-    pub fn timing(&self, options: &TimingOptions) -> Timing {
+    pub fn timing(&self, options: &TimingOptions) -> PlanTiming {
         let assumed = Assumed::of(self, options);
         let delays = line_delay::line_delays(self, &assumed);
         let frames = frame_times(self, &assumed);
@@ -98,7 +98,7 @@ impl Plan {
         for device in &mut devices {
             proposal::for_one(self, device, assumed.margin);
         }
-        Timing {
+        PlanTiming {
             jitter: assumed.jitter,
             outputs: estimate::outputs(self, &assumed),
             inputs: estimate::inputs(self, &assumed),

@@ -1,7 +1,7 @@
 //! The timing of a plan as JSON.
 
 use linesman_config::plan::timing::{
-    CycleTimes, DeviceTiming, FrameArrival, RuleTiming, Timing, TimingVerdict,
+    CycleTimes, DeviceTiming, FrameArrival, PlanTiming, RuleTiming, TimingVerdict,
 };
 use linesman_config::plan::{Plan, ShiftReference};
 use linesman_proto::address::DeviceId;
@@ -11,7 +11,7 @@ use serde::Serialize;
 /// The timing: whether each SubDevice with SYNC0 is in time, and by how much.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct TimingReport {
+pub(super) struct PlanTimingReport {
     /// `pass`, `fail`, or `not-judged` where something is not known; one that fails decides.
     verdict: &'static str,
     /// How early and how late the MainDevice sends at the most, given or assumed.
@@ -153,10 +153,10 @@ pub(in crate::command::plan) const fn word(verdict: TimingVerdict) -> &'static s
 }
 
 /// The report.
-pub(super) fn of(plan: &Plan, timing: &Timing) -> TimingReport {
+pub(super) fn of(plan: &Plan, timing: &PlanTiming) -> PlanTimingReport {
     let ns = Span::as_nanos;
     let outputs = &timing.outputs;
-    TimingReport {
+    PlanTimingReport {
         verdict: word(timing.verdict()),
         jitter_ns: ns(timing.jitter),
         outputs_estimate: OutputsEstimateReport {
