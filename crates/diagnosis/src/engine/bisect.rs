@@ -21,14 +21,18 @@ use linesman_proto::topology::End;
 
 use super::{Asked, Probe, ProbeEffect};
 use crate::model::search::behind;
-use crate::model::{Device, HoleSearch, NetworkModel, Seen};
+use crate::model::{Device, HoleSearch, LoopWrite, NetworkModel, Seen};
 
 /// So long nothing must have come back before ports are closed.
 const SILENT: Span = Span::ms(100);
 /// So long a closed port gets to show that it helps: longer than lost requests are repeated.
 const PATIENCE: Span = Span::ms(60);
+/// An order to close that was not on its way by then is given again: a line with a long cycle has much to send.
+const UNSENT: Span = Span::ms(500);
 /// After a port was opened again, frames that were turned back at it may still be on their way.
 const SETTLE: Span = Span::ms(15);
+/// A port that was told to open, and seems not to have heard it, is told again after so long.
+const TOLD_AGAIN: Span = Span::ms(100);
 /// When something came back, requests that were lost before have been sent again after so long, and come back.
 const REPEATED: Span = Span::ms(25);
 /// So many requests, sent after a port was closed or opened, decide what that has changed.
@@ -37,7 +41,7 @@ const SEVERAL: u64 = 6;
 const ROUND: Span = Span::ms(10);
 /// A silence that follows so soon upon a search belongs to it.
 const AGAIN: Span = Span::s(1);
-/// Frames that go on coming back after that, with all ports open: the hole has gone by itself.
+/// Frames that go on coming back for so long, when every port has opened by itself: the hole has gone.
 const HEALED: Span = Span::ms(1_200);
 
 /// A search that is going on.
@@ -52,14 +56,25 @@ pub(super) struct Bisect {
 
 #[derive(Clone, Copy, Debug)]
 enum SearchStep {
-    /// Nothing is closed; since when.
-    Open(Instant),
-    /// Nothing is closed, and it is watched whether frames vanish again.
-    NetworkWatch(FrameMark),
+    /// The port before this link was told to open; when.
+    Open(usize, Instant),
+    /// Nothing should be closed, and it is watched whether frames vanish again.
+    NetworkWatch(FrameMark, Option<Opened>),
     /// The port before this link is closed; since when.
     Closed(usize, Instant),
     /// The port before this link is closed, and something came back.
     Helps(usize, FrameMark),
+}
+
+/// A port that was told to open.
+#[derive(Clone, Copy, Debug)]
+struct Opened {
+    /// The link behind it.
+    link: usize,
+    /// When it was first told to.
+    since: Instant,
+    /// When it was last told to.
+    told: Instant,
 }
 
 /// What had been sent and had come back at a time.
@@ -115,7 +130,7 @@ impl Bisect {
         model.hole = Some(HoleSearch { since, found: None, has_helped: false, ended: None });
         // That nothing comes back is known already.
         let nothing = FrameMark { at: now.before(ROUND), sent: 0, ..FrameMark::of(model, now) };
-        Some(Self { before: left.clone(), left, step: SearchStep::NetworkWatch(nothing) })
+        Some(Self { before: left.clone(), left, step: SearchStep::NetworkWatch(nothing, None) })
     }
 
     /// Goes on. Gives what is to be written next; the search is over when the line says so.
@@ -126,9 +141,18 @@ impl Bisect {
                 self.step = SearchStep::Helps(link, FrameMark::of(model, now));
                 None
             }
-            // The request may be sent again for a while: what is written before that is over would be undone.
-            SearchStep::Closed(_, at) if now < at + PATIENCE => None,
-            SearchStep::Closed(link, _) => {
+            SearchStep::Closed(link, at) => {
+                let Some(sent) = close_sent(model, link, at) else {
+                    if now < at + UNSENT {
+                        return None;
+                    }
+                    self.step = SearchStep::Closed(link, now);
+                    return set(model, link, Some(LoopMode::Closed), now);
+                };
+                // The request may be sent again for a while: what is written before that is over would be undone.
+                if now < sent + PATIENCE {
+                    return None;
+                }
                 let behind = behind(model.tree.as_ref()?, link);
                 self.left.retain(|one| !behind.contains(one));
                 self.close_next(model, now)
@@ -146,23 +170,33 @@ impl Bisect {
                 let behind = behind(model.tree.as_ref()?, link);
                 self.before = self.left.clone();
                 self.left.retain(|one| behind.contains(one));
-                self.step = SearchStep::Open(now);
+                self.step = SearchStep::Open(link, now);
                 // It would open by itself; but the next port may lie behind it.
                 set(model, link, None, now)
             }
-            SearchStep::Open(at) if now < at + SETTLE => None,
-            SearchStep::Open(_) => {
-                self.step = SearchStep::NetworkWatch(FrameMark::of(model, now));
+            SearchStep::Open(_, at) if now < at + SETTLE => None,
+            SearchStep::Open(link, at) => {
+                let opened = Opened { link, since: at, told: at };
+                self.step = SearchStep::NetworkWatch(FrameMark::of(model, now), Some(opened));
                 None
             }
-            SearchStep::NetworkWatch(mark) if came_back.is_some_and(|back| back > mark.at) => {
-                if now >= mark.at + HEALED {
+            SearchStep::NetworkWatch(mark, opened)
+                if came_back.is_some_and(|back| back > mark.at) =>
+            {
+                let mark = FrameMark::of(model, now);
+                let Some(opened) = opened.filter(|opened| now < opened.since + HEALED) else {
                     // Whether the latest port helped, or the hole went just then, nobody knows.
                     end(model, std::mem::take(&mut self.before), false, now);
-                }
-                None
+                    return None;
+                };
+                // With a long cycle the order is later on its way, and it may be lost: the port then opens by itself
+                // some time later.
+                let is_late = now >= opened.told + TOLD_AGAIN;
+                let told = if is_late { now } else { opened.told };
+                self.step = SearchStep::NetworkWatch(mark, Some(Opened { told, ..opened }));
+                if is_late { set(model, opened.link, None, now) } else { None }
             }
-            SearchStep::NetworkWatch(mark) => {
+            SearchStep::NetworkWatch(mark, _) => {
                 mark.since(model, now)?;
                 if self.before.len() > self.left.len()
                     && let Some(hole) = &mut model.hole
@@ -215,6 +249,16 @@ fn end(model: &mut NetworkModel, left: Vec<usize>, is_certain: bool, now: Instan
     }
     model.hole_left = left;
     model.touch();
+}
+
+/// When the order to close the port before a link was last on its way, since `at`; `None`: not yet. One that does not
+/// come back is heard of only when it is given up.
+fn close_sent(model: &NetworkModel, link: usize, at: Instant) -> Option<Instant> {
+    let (device, port, _) = near(model, link)?;
+    let is_it = |write: &&LoopWrite| {
+        write.device == device && write.closed == Some(port) && write.seen.at >= at
+    };
+    model.loop_writes.iter().rev().find(is_it).map(|write| write.seen.at)
 }
 
 /// The port before a link, with how DL control of its controller stands.

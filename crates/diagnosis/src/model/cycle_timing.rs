@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use linesman_proto::time::{Instant, Span};
 
+use super::spell::{Spell, SpellEntry};
+
 /// Intervals from whose middle the cycle is taken: so many that half of them may be off.
 const LEARNT_FROM: usize = 33;
 /// So many intervals off the beat one after the other are another beat.
 const OTHER_BEAT: u32 = 24;
-/// Intervals off the beat that are kept.
-const KEPT: usize = 64;
 /// Pauses that are kept.
 const PAUSES_KEPT: usize = 16;
 /// A pause lasts at least so many cycles …
@@ -28,6 +28,16 @@ pub struct CycleDeviation {
     pub at: Instant,
     /// By how much it was too long or too short.
     pub by: Span,
+}
+
+impl SpellEntry for CycleDeviation {
+    fn at(&self) -> Instant {
+        self.at
+    }
+
+    fn by(&self) -> Span {
+        self.by
+    }
 }
 
 /// A stretch of time without any.
@@ -55,10 +65,10 @@ pub struct CycleTiming {
     cycle: Option<Span>,
     last: Option<Instant>,
     off_in_a_row: u32,
-    /// The latest intervals off the beat, oldest first.
-    pub off: VecDeque<CycleDeviation>,
-    /// The latest uneven intervals, those off the beat included, oldest first.
-    pub uneven: VecDeque<CycleDeviation>,
+    /// Intervals off the beat.
+    pub off: Spell<CycleDeviation>,
+    /// Uneven intervals, those off the beat included.
+    pub uneven: Spell<CycleDeviation>,
     /// The latest pauses, oldest first.
     pub pauses: VecDeque<Pause>,
 }
@@ -91,7 +101,10 @@ impl CycleTiming {
         let (interval_ns, cycle_ns) = (interval.as_nanos(), cycle.as_nanos());
         let paused = interval >= PAUSE && interval_ns >= PAUSE_CYCLES * cycle_ns;
         if paused {
-            keep(&mut self.pauses, Pause { from: last, to: at }, PAUSES_KEPT);
+            if self.pauses.len() == PAUSES_KEPT {
+                self.pauses.pop_front();
+            }
+            self.pauses.push_back(Pause { from: last, to: at });
         }
         let is_off = |by: u64| by * 100 >= cycle_ns * OFF_PERCENT;
         // Whatever is missing between them is missing, not late.
@@ -99,7 +112,7 @@ impl CycleTiming {
         let by = interval_ns.abs_diff(cycles * cycle_ns);
         let off = CycleDeviation { at, by: Span::ns(by) };
         if by * 100 >= cycle_ns * UNEVEN_PERCENT {
-            keep(&mut self.uneven, off, KEPT);
+            self.uneven.push(off);
         }
         if !is_off(interval_ns.abs_diff(cycle_ns)) {
             self.off_in_a_row = 0;
@@ -118,7 +131,7 @@ impl CycleTiming {
         if !is_off(by) {
             return paused;
         }
-        keep(&mut self.off, off, KEPT);
+        self.off.push(off);
         true
     }
 
@@ -137,13 +150,6 @@ impl CycleTiming {
         let middle = all[LEARNT_FROM / 2];
         self.cycle = (middle > 0).then_some(Span::ns(middle));
     }
-}
-
-fn keep<T>(all: &mut VecDeque<T>, one: T, most: usize) {
-    if all.len() == most {
-        all.pop_front();
-    }
-    all.push_back(one);
 }
 
 #[cfg(test)]
@@ -165,29 +171,29 @@ mod tests {
     fn the_cycle_is_learnt_although_some_are_late() {
         let beat = ticked((0..40).map(|n| if n % 5 == 0 { 1_300 } else { 1_000 }));
         assert_eq!(beat.cycle(), Some(Span::ms(1)));
-        let late: Vec<u64> = beat.off.iter().map(|off| off.by.as_nanos()).collect();
+        let late: Vec<u64> = beat.off.latest().iter().map(|off| off.by.as_nanos()).collect();
         assert_eq!(late, [300_000], "that before the cycle was known says nothing");
     }
 
     #[test]
     fn a_fifth_of_the_cycle_is_off_and_less_is_not() {
         let steady = || std::iter::repeat_n(1_000, 40);
-        assert!(ticked(steady().chain([1_199, 801])).off.is_empty());
-        assert_eq!(ticked(steady().chain([1_200, 800])).off.len(), 2);
-        assert_eq!(ticked(steady().chain([1_099, 1_100, 1_300])).uneven.len(), 2);
+        assert!(ticked(steady().chain([1_199, 801])).off.latest().is_empty());
+        assert_eq!(ticked(steady().chain([1_200, 800])).off.latest().len(), 2);
+        assert_eq!(ticked(steady().chain([1_099, 1_100, 1_300])).uneven.latest().len(), 2);
     }
 
     #[test]
     fn what_is_missing_is_not_late_and_comes_in_any_order() {
         let steady = || std::iter::repeat_n(1_000, 40);
         let mut beat = ticked(steady().chain([2_000, 3_000, 1_000]));
-        assert!(beat.off.is_empty(), "{:?}", beat.off);
+        assert!(beat.off.latest().is_empty(), "{:?}", beat.off);
         // A lost one is heard of afterwards.
         let last = beat.last().unwrap();
         beat.tick(Instant::from_nanos(last.as_nanos() - 1_500_000));
-        assert_eq!((beat.last(), beat.off.len()), (Some(last), 0));
+        assert_eq!((beat.last(), beat.off.latest().len()), (Some(last), 0));
         // Late by most of a cycle: the next interval tells.
-        assert_eq!(ticked(steady().chain([1_900, 100])).off.len(), 1);
+        assert_eq!(ticked(steady().chain([1_900, 100])).off.latest().len(), 1);
     }
 
     #[test]
@@ -197,6 +203,6 @@ mod tests {
         assert_eq!(beat.pauses.len(), 1);
         assert_eq!(beat.pauses[0].span(), Span::ms(112));
         let slower = ticked(steady().chain(std::iter::repeat_n(2_000, 80)));
-        assert_eq!((slower.cycle(), slower.off.len()), (Some(Span::ms(2)), 0));
+        assert_eq!((slower.cycle(), slower.off.latest().len()), (Some(Span::ms(2)), 0));
     }
 }

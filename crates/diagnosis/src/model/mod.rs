@@ -23,6 +23,7 @@ pub mod round_trip;
 pub mod search;
 pub mod set_up;
 pub mod sii_image;
+pub mod spell;
 pub mod traffic;
 pub mod working_counter;
 
@@ -56,6 +57,7 @@ pub use round_trip::RoundTripTimes;
 pub use search::LoopWrite;
 pub use set_up::{ClockSetUp, SetUp};
 pub use sii_image::{Power, SiiImage};
+pub use spell::Spell;
 pub use traffic::{Silence, Traffic};
 pub use working_counter::{Deficit, Ordered, WorkingCounterHistory};
 

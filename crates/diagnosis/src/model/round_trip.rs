@@ -4,11 +4,12 @@
 //! the card, and that is known. What comes back later was kept back by a computer, a card or a queue, on its
 //! way out or in.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use linesman_proto::time::{Instant, Span};
 
 use super::PathDelays;
+use super::spell::{Spell, SpellEntry};
 
 /// Lengths of frames that are followed.
 const LENGTHS: usize = 128;
@@ -38,8 +39,6 @@ const CALM: u64 = 16;
 const MOST: u64 = 66;
 /// … if there were so many at all.
 const SEVERAL: u64 = 8;
-/// Late frames that are kept.
-const KEPT: usize = 64;
 /// On 100 Mbit/s, in ns.
 const BYTE: u64 = 80;
 /// Preamble, check sequence and the gap to the next frame, in bytes.
@@ -58,6 +57,16 @@ pub struct LateFrame {
     pub frame: u64,
     /// How much later than usual it came back.
     pub by: Span,
+}
+
+impl SpellEntry for LateFrame {
+    fn at(&self) -> Instant {
+        self.sent
+    }
+
+    fn by(&self) -> Span {
+        self.by
+    }
 }
 
 /// Frames that came back later than the fastest of their length by some time or more.
@@ -100,8 +109,8 @@ pub struct RoundTripTimes {
     worst_learnt: u64,
     /// Late ones in a row, as long as they may be on another way.
     alike: Vec<LateFrame>,
-    /// The latest late ones, oldest first.
-    pub late: VecDeque<LateFrame>,
+    /// Late ones.
+    pub late: Spell<LateFrame>,
     /// All late ones.
     pub late_count: u64,
     /// Frames that were compared from the first late one to the latest.
@@ -244,10 +253,7 @@ impl RoundTripTimes {
     /// What was late, was.
     fn settle(&mut self) {
         for late in self.alike.drain(..) {
-            if self.late.len() == KEPT {
-                self.late.pop_front();
-            }
-            self.late.push_back(late);
+            self.late.push(late);
             self.late_count += 1;
             self.compared = self.since_first.max(self.late_count);
         }
@@ -272,8 +278,8 @@ mod tests {
         play(&mut round_trips, 0, &[20; 600]);
         play(&mut round_trips, 600, &[20, 150, 20]);
         assert_eq!(round_trips.late_count, 1);
-        assert_eq!(round_trips.late[0].by, Span::us(130));
-        assert_eq!(round_trips.late[0].frame, 601);
+        assert_eq!(round_trips.late.latest()[0].by, Span::us(130));
+        assert_eq!(round_trips.late.latest()[0].frame, 601);
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub const TOGETHER: Span = Span::s(10);
 const KEPT: usize = 64;
 
 /// Something that was off by some time at a time.
-pub trait Timed: Copy {
+pub trait SpellEntry: Copy {
     /// When it was.
     fn at(&self) -> Instant;
     /// By how much it was off.
@@ -47,7 +47,7 @@ impl<T> Default for Spell<T> {
     }
 }
 
-impl<T: Timed> Spell<T> {
+impl<T: SpellEntry> Spell<T> {
     /// The latest ones, oldest first, at most 64.
     #[must_use]
     pub const fn latest(&self) -> &VecDeque<T> {
@@ -75,7 +75,8 @@ impl<T: Timed> Spell<T> {
                 earlier.worst = earlier.worst.max(gone.by());
             }
             _ => {
-                self.earlier = Some(Earlier { first: gone, last: gone, count: 1, worst: gone.by() });
+                self.earlier =
+                    Some(Earlier { first: gone, last: gone, count: 1, worst: gone.by() });
             }
         }
     }
@@ -85,7 +86,7 @@ impl<T: Timed> Spell<T> {
 mod tests {
     use super::*;
 
-    impl Timed for (u64, u64) {
+    impl SpellEntry for (u64, u64) {
         fn at(&self) -> Instant {
             Instant::from_nanos(self.0 * 1_000_000)
         }

@@ -21,6 +21,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
+use crate::model::spell::{Earlier, TOGETHER};
 use crate::model::{Absence, CycleDeviation, CycleTiming, Cyclic, Device};
 
 /// The page.
@@ -70,8 +71,6 @@ impl Verdict {
 
 /// One late frame makes two uneven intervals; a single one is no matter.
 const OFTEN: usize = 3;
-/// What lies closer together belongs together.
-const TOGETHER: Span = Span::s(10);
 /// What did not come again for this long is over.
 const QUIET: Span = Span::s(2);
 
@@ -82,11 +81,18 @@ struct Interval<'a> {
     /// Whether the frames left unevenly already.
     at_sending: bool,
     off: Vec<CycleDeviation>,
+    /// Those before, which are not kept one by one.
+    earlier: Option<Earlier<CycleDeviation>>,
 }
 
 impl Interval<'_> {
     fn worst(&self) -> Span {
-        self.off.iter().map(|off| off.by).max().unwrap_or(Span::ZERO)
+        let earlier = self.earlier.map(|earlier| earlier.worst);
+        self.off.iter().map(|off| off.by).chain(earlier).max().unwrap_or(Span::ZERO)
+    }
+
+    fn times(&self) -> u64 {
+        self.off.len() as u64 + self.earlier.map_or(0, |earlier| earlier.count)
     }
 
     fn verdict(&self) -> Option<Verdict> {
@@ -110,6 +116,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let worst = spells.max_by_key(|spell| spell.worst());
     let Some(spell) = worst else { return };
     let (Some(first), Some(last)) = (spell.off.first(), spell.off.last()) else { return };
+    let first = spell.earlier.map_or(*first, |earlier| earlier.first);
     // Whoever runs free takes outputs when they come. A recording, which has the times at which frames came to the
     // card, is the only witness of what the computer did before.
     let is_recorded = !view.model.traffic.recording.is_direction_known();
@@ -161,16 +168,26 @@ fn spell<'a>(cyclic: &'a Cyclic, keeps_step: bool, away: &[&Absence]) -> Option<
         let cycle = beat.cycle()?;
         let mut off: Vec<CycleDeviation> = Vec::new();
         let all = if keeps_step { &beat.off } else { &beat.uneven };
-        for one in all.iter().rev() {
+        let is_own = |at: Instant| !away.iter().any(|absence| absence.disturbs(at));
+        // Those before belong to it as long as none is missing in between.
+        let mut earlier = all.earlier().filter(|earlier| {
+            let was_within = |absence: &&&Absence| {
+                absence.since.at >= earlier.first.at && absence.since.at <= earlier.last.at
+            };
+            is_own(earlier.first.at) && !away.iter().any(|absence| was_within(&absence))
+        });
+        for one in all.latest().iter().rev() {
             if off.last().is_some_and(|later| later.at.since(one.at) > TOGETHER) {
+                earlier = None;
                 break;
             }
-            if !away.iter().any(|absence| absence.disturbs(one.at)) {
+            if is_own(one.at) {
                 off.push(*one);
             }
         }
         off.reverse();
-        (off.len() >= OFTEN).then_some(Interval { cyclic, cycle, at_sending, off })
+        let earlier = earlier.copied();
+        (off.len() >= OFTEN).then_some(Interval { cyclic, cycle, at_sending, off, earlier })
     };
     of(&cyclic.sent, true).or_else(|| of(&cyclic.returned, false))
 }
@@ -189,7 +206,7 @@ fn evidence(spell: &Interval<'_>, at: Instant, in_step: usize) -> Evidence {
         "process data at {} {what} unevenly {} times: by {:.3} ms of a cycle of {:.3} ms at most, that is \
          {percent:.0} %; {whom}",
         spell.cyclic.start,
-        spell.off.len(),
+        spell.times(),
         ms(worst),
         ms(spell.cycle)
     );

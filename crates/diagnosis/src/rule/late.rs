@@ -25,6 +25,7 @@ use linesman_proto::time::Span;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::model::round_trip::LateFrame;
+use crate::model::spell::TOGETHER;
 use crate::model::{Device, NetworkModel};
 
 /// The page.
@@ -41,8 +42,6 @@ pub const RULE: Rule = Rule { pages: &[PAGE], judge };
 
 /// What did not come again for this long is over.
 const QUIET: Span = Span::s(2);
-/// What lies closer together belongs together.
-const TOGETHER: Span = Span::s(10);
 /// Where nobody keeps step, what is late by this part of the cycle is told: half of what is doubtful to whoever does.
 const NOTABLE: u64 = 10;
 /// What is late by this part of the cycle all the time is told, whatever is usual here …
@@ -73,26 +72,32 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let keeps_step = model.devices.iter().any(|device| device.sync_on.is_some_and(|on| on.value));
     let Some(cycle) = shortest_cycle(model) else { return };
     // What is late by less does no harm, unless somebody lost step by it.
-    let hurts = |late: &Late| keeps_step && !hurt(model, late).is_empty();
+    let hurts = |late: &Late| keeps_step && !hurt(model, late, cycle, conditions).is_empty();
     let matters = |late: &Late| late.worst * NOTABLE >= cycle || hurts(late);
     let unusual = unusual(model, cycle).filter(matters);
     let Some(late) = unusual.or_else(|| held_back(model, cycle)) else { return };
-    conditions.push(condition(view, &late, cycle, keeps_step));
+    let condition = condition(view, &late, cycle, keeps_step, conditions);
+    conditions.push(condition);
 }
 
 /// Frames that were later than is usual here.
 fn unusual(model: &NetworkModel, cycle: Span) -> Option<Late> {
     let round_trips = &model.round_trips;
-    let last = *round_trips.late.back()?;
+    let latest = round_trips.late.latest();
+    let last = *latest.back()?;
+    let mut earlier = round_trips.late.earlier();
     let mut first = last;
-    for late in round_trips.late.iter().rev() {
+    for late in latest.iter().rev() {
         if first.sent.since(late.sent) > TOGETHER {
+            earlier = None;
             break;
         }
         first = *late;
     }
-    let of_spell = || round_trips.late.iter().filter(|late| late.sent >= first.sent);
-    let worst = of_spell().map(|late| late.by).max().unwrap_or(Span::ZERO);
+    let of_spell = || latest.iter().filter(|late| late.sent >= first.sent);
+    let worst = of_spell().map(|late| late.by).chain(earlier.map(|earlier| earlier.worst)).max();
+    let worst = worst.unwrap_or(Span::ZERO);
+    let first = earlier.map_or(first, |earlier| earlier.first);
     let text = format!(
         "{} later than the line takes: by {:.3} ms at most, {} % of the cycle",
         match round_trips.late_count {
@@ -132,7 +137,13 @@ fn percent(part: Span, whole: Span) -> u64 {
     part.as_nanos() * 100 / whole.as_nanos().max(1)
 }
 
-fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Condition {
+fn condition(
+    view: &View<'_>,
+    late: &Late,
+    cycle: Span,
+    keeps_step: bool,
+    conditions: &[Condition],
+) -> Condition {
     let model = view.model;
     let Late { first, last, worst, .. } = late;
     let (cause, other) = if late.is_queue {
@@ -149,7 +160,7 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
         .shown_by(Evidence::frame(last.sent + last.by, last.frame, late.text.clone()))
         .advise("Run `linesman host --measure 10`: it tells what makes this computer late, and what mends it.")
         .advise("Take switches and media converters out of the way between card and first SubDevice.");
-    let hurt = hurt(model, late);
+    let hurt = hurt(model, late, cycle, conditions);
     if hurt.is_empty() && is_recorded {
         let text = match keeps_step {
             true => "no SubDevice has lost its step meanwhile, as far as the recording shows",
@@ -174,14 +185,28 @@ fn condition(view: &View<'_>, late: &Late, cycle: Span, keeps_step: bool) -> Con
     condition
 }
 
-/// SubDevices that lost step while frames were late.
-fn hurt<'m>(model: &'m NetworkModel, late: &Late) -> Vec<&'m Device> {
+/// SubDevices that lost step while frames were late. Where damage on the line explains it of one, as frames that are lost
+/// bring neither outputs nor the time of the reference clock, it was that, unless others were late by a part of the cycle
+/// that matters.
+fn hurt<'m>(
+    model: &'m NetworkModel,
+    late: &Late,
+    cycle: Span,
+    known: &[Condition],
+) -> Vec<&'m Device> {
     // The set-up of SYNC signals may have been before the first frame that was seen.
     let may_be_unseen = !model.sees_all_orders;
     let may_keep_step = |device: &&Device| device.sync_on.map_or(may_be_unseen, |on| on.value);
     let in_step = model.devices.iter().filter(may_keep_step);
     let until = late.last.sent + late.last.by;
-    in_step.filter(|device| device.lost_step_within(late.first.sent, until)).collect()
+    let is_slight = late.worst * NOTABLE < cycle;
+    let is_explained = |device: &Device| {
+        let lost = Symptom::StateLost(device.id);
+        let mut known = known.iter().filter(|one| one.page.class == Class::Hardware);
+        known.any(|one| one.explains.contains(&lost))
+    };
+    let lost_step = |device: &&Device| device.lost_step_within(late.first.sent, until);
+    in_step.filter(lost_step).filter(|device| !(is_slight && is_explained(device))).collect()
 }
 
 /// The shortest cycle of process data.

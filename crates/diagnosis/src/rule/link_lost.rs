@@ -26,11 +26,10 @@
 //! bus press the terminals together and look at the contacts. Measure the supply of the device behind.
 
 mod card;
+mod follows;
 mod never_seen;
 mod other_way;
 mod swallowed_half;
-
-use std::collections::BTreeSet;
 
 use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
@@ -45,6 +44,8 @@ use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::locate::{LinkLoss, LinkLosses};
 use crate::model::{NetworkModel, Seen, search};
+
+pub(super) use follows::follows;
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -391,58 +392,6 @@ fn ends(model: &NetworkModel, tree: &Tree, link: usize) -> Vec<Symptom> {
         }
     };
     ends.into_iter().filter_map(symptom).collect()
-}
-
-/// What can follow from the loss.
-pub(super) fn follows(model: &NetworkModel, tree: &Tree, link: usize) -> Vec<Symptom> {
-    let mut follows: BTreeSet<Symptom> = ends(model, tree, link).into_iter().collect();
-    for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
-        if let End::Controller(node, port) = end {
-            follows.insert(Symptom::LinkCounted(DeviceId(node as u32), port));
-        }
-    }
-    follows.extend([Symptom::FramesLost, Symptom::CardErrors]);
-    // Errors at the moment of the change are not reported at all; others are trouble of their own.
-    for end in [tree.links()[link].upstream, tree.links()[link].downstream] {
-        if let End::MainDevice(_) = end {
-            follows.extend([Symptom::NoCarrier, Symptom::NobodyAnswers]);
-        }
-    }
-    if let End::Controller(node, _) = tree.links()[link].downstream {
-        follows.extend(lost_beyond(model, tree, link, node));
-        for &node in tree.subtree(node) {
-            let id = DeviceId(node as u32);
-            follows.extend([
-                Symptom::Silent(id),
-                Symptom::WorkingCounter(id),
-                Symptom::StateLost(id),
-                Symptom::Emergency(id),
-            ]);
-            // If it is the device that failed, those behind it lost their links, too.
-            follows.extend(Port::ALL.map(|port| Symptom::LinkCounted(id, port)));
-        }
-    }
-    follows.into_iter().collect()
-}
-
-/// The links beyond the device behind a lost one, as far as they were lost with it: then it was without
-/// supply. Those that were lost more often, or before, have trouble of their own.
-fn lost_beyond(model: &NetworkModel, tree: &Tree, link: usize, behind: usize) -> Vec<Symptom> {
-    let all = LinkLosses::all(model);
-    let of = |link: usize| all.iter().find(|drops| drops.link == link);
-    let Some(own) = of(link) else { return Vec::new() };
-    let mut lost = Vec::new();
-    for (port, child) in tree.children(behind) {
-        let beyond = tree.link_above(child).and_then(of);
-        let is_with = |beyond: &&LinkLosses| {
-            beyond.count <= own.count && beyond.first >= own.first && !beyond.is_down
-        };
-        if beyond.filter(is_with).is_some() {
-            lost.push(Symptom::LinkDown(DeviceId(behind as u32), port));
-            lost.push(Symptom::LinkDown(DeviceId(child as u32), tree.entry(child)));
-        }
-    }
-    lost
 }
 
 fn status_evidence(model: &NetworkModel, drop: &LinkLoss) -> Evidence {

@@ -209,7 +209,11 @@ fn shortest_outage(model: &NetworkModel) -> Option<Span> {
         let mut shortest: Option<Span> = None;
         for seen in &device.dl.changes {
             match (seen.from.port_state(port).is_active(), seen.to.port_state(port).is_active()) {
-                (true, false) => down = Some(seen.at),
+                // Who was away itself does not know since when.
+                (true, false) => {
+                    let was_away = device.absences.iter().any(|one| one.disturbs(seen.at));
+                    down = Some(seen.at).filter(|_| !was_away);
+                }
                 (false, true) => {
                     let lasted = down.take().map(|since| seen.at.since(since));
                     shortest = shortest.into_iter().chain(lasted).min();

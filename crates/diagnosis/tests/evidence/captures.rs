@@ -59,7 +59,7 @@ const NOTES: [(&str, &str, &str); 2] = [
     (
         "ec-replay-ek1100-el2828-el2889",
         "T410",
-        "64 times: by 1.861 ms of a cycle of 4.790 ms at most",
+        "83 times: by 1.861 ms of a cycle of 4.790 ms at most",
     ),
     ("echist-no-reborrow-202307", "T410", "45 times: by 3.972 ms of a cycle of 5.167 ms at most"),
 ];

@@ -22,6 +22,24 @@ fn a_slice_of_the_score_stays_above_its_floors() {
 }
 
 #[test]
+fn cases_that_were_once_judged_wrongly_are_judged_right() {
+    let options = ScoreOptions::default();
+    let cases = [
+        (30_000_000, "a link that stays open when the one before it is mended"),
+        (30_000_466, "damage within a SubDevice, and frames that are late by 5 % of the cycle"),
+        (223_384_000_150, "frames vanish in a line of 155 with a long cycle"),
+        (223_384_000_158, "so many uneven frames that the first are not kept one by one"),
+    ];
+    for (seed, what) in cases {
+        let mut tally = Tally::new(options);
+        tally.add(&run_case(seed, &options));
+        let report = tally.report();
+        assert_eq!(report.effective_cases, 1, "{what}");
+        assert!(report.wrong.is_empty(), "{what}: {:?}", report.wrong);
+    }
+}
+
+#[test]
 fn a_seed_is_judged_the_same_each_time() {
     let options = ScoreOptions::default();
     for seed in 1..4 {
