@@ -146,7 +146,8 @@ impl Core {
     pub(super) fn start(&mut self, now: Instant) {
         self.memory.clear();
         self.ports.restart();
-        self.clock = RunningClock::new(self.quartz, now);
+        // It begins at 0 (SOEM#48).
+        self.clock = RunningClock::new(LocalClock { start: 0, ..self.quartz }, now);
         self.startup = Startup { powered_at: now, ..Startup::default() };
         self.rights = self.hardware.rights(ClockUnits::default());
         self.time_loop = TimeLoop::default();
@@ -170,6 +171,11 @@ impl Core {
         self.refresh_leds();
         let status = self.dl_status();
         self.memory.set_u16(&r::DL_STATUS, status.0);
+    }
+
+    /// The supply has been there for long: the clock shows what the segment file says, or chance.
+    pub(super) fn clock_runs_before(&mut self, at: Instant) {
+        self.clock = RunningClock::new(self.quartz, at);
     }
 
     fn identify(&mut self) {

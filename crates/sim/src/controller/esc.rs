@@ -114,6 +114,7 @@ impl Controller {
             self.firmware.stop(signals);
         }
         self.power_on(at);
+        self.core.clock_runs_before(at);
         while !self.core.startup.loaded && self.core.sii.done_at().is_some() {
             self.finish_sii(at, signals);
         }

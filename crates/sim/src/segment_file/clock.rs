@@ -26,7 +26,8 @@ pub struct SegmentClock {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(range(max = 1000)))]
     pub jitter_ns: Option<u16>,
-    /// What it shows at power-on, in ns; by chance up to 1,000 s unless said.
+    /// What it shows when the run begins, in ns; by chance up to 1,000 s unless said. At each power-on
+    /// of the run it begins at 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_ns: Option<u64>,
 }

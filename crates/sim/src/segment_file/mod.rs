@@ -151,7 +151,7 @@ pub struct SegmentDevice {
     /// programmable logic do; as its type has it unless said.
     #[serde(default)]
     pub remakes_symbol_errors: Option<bool>,
-    /// How else its clock is off: warming up, jitter, what it shows at power-on.
+    /// How else its clock is off: warming up, jitter, what it shows when the run begins.
     #[serde(default)]
     pub clock: Option<SegmentClock>,
     /// Whether its controllers have counters of forwarded errors; as the segment, or else its type,

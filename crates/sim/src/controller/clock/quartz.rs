@@ -8,7 +8,7 @@ const BILLION: i128 = 1_000_000_000;
 /// How a controller's quartz behaves.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct LocalClock {
-    /// What it shows at power-on, in ns.
+    /// What it shows when the run begins, in ns: the supply was there before. At each power-on of the run it begins at 0.
     pub start: u64,
     /// How much too fast it runs, in parts per thousand million; negative is too slow. Quartzes of
     /// SubDevices are within 25 ppm, that is 25,000.
