@@ -9,7 +9,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::time::{Instant, Span};
 
-use crate::model::{Device, NetworkModel};
+use crate::model::{Device, NetworkModel, UpTime};
 
 /// From one turn to the next.
 const EVERY: Span = Span::ms(200);
@@ -36,6 +36,8 @@ pub(super) struct BackgroundPoll {
     watchdogs: usize,
     /// For which of its errors a device was last asked.
     asked: BTreeMap<DeviceId, Instant>,
+    /// For which of its falls it was last asked how long it is up.
+    asked_up: BTreeMap<DeviceId, Instant>,
 }
 
 impl BackgroundPoll {
@@ -62,9 +64,24 @@ impl BackgroundPoll {
         let clocked: Vec<DeviceId> = up.iter().filter(in_step).map(|device| device.id).collect();
         let all: Vec<DeviceId> = up.iter().map(|device| device.id).collect();
         self.next = (!all.is_empty()).then_some(now + EVERY);
+        let restarted = self.restarted(model);
         let clocks = take(&mut self.clocks, &clocked, CLOCKS).map(|id| (id, DIFFERENCE));
         let watchdogs = take(&mut self.watchdogs, &all, WATCHDOGS).map(|id| (id, WATCHDOG));
-        clocks.chain(watchdogs).collect()
+        clocks.chain(watchdogs).chain(restarted).collect()
+    }
+
+    /// Who has fallen since the last turn, and answers: how long it is up tells how long its supply was away.
+    fn restarted(&mut self, model: &NetworkModel) -> Vec<(DeviceId, PolledRegister)> {
+        let mut wanted = Vec::new();
+        for device in &model.devices {
+            let mut falls = device.al.changes.iter().rev().filter(|change| change.is_own_fall());
+            let Some(fall) = falls.next() else { continue };
+            let is_there = device.silent.is_none() && device.station.is_some();
+            if is_there && self.asked_up.insert(device.id, fall.at) != Some(fall.at) {
+                wanted.push((device.id, UpTime::REGISTERS));
+            }
+        }
+        wanted
     }
 
     /// Objects that tell why devices lost their step, once for each time.

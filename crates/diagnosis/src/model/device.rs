@@ -18,7 +18,7 @@ use linesman_proto::topology::SeenController;
 use super::mailbox::MailboxHistory;
 use super::{
     AlChange, AlError, AlHistory, ClockHistory, CounterHistory, Counting, DlHistory, ErrorSum,
-    Power, ReportedTrouble, Seen, SetUp, SiiImage, push_kept,
+    Power, ReportedTrouble, Seen, SetUp, SiiImage, UpTime, push_kept,
 };
 
 /// A state that was lost is read so long after what it was lost by, at most.
@@ -86,6 +86,8 @@ pub struct Device {
     /// When a frame was received at each port, by its own clock: registers 0x0900 to 0x090F as last
     /// read. Those of closed ports mean nothing.
     pub received: Option<PortMap<DcTime32>>,
+    /// Time since it came up, as last read.
+    pub up_time: Option<UpTime>,
     /// Whether its SYNC signals are switched on: register 0x0981 as last written.
     pub sync_on: Option<Seen<bool>>,
     /// How far its clock is off the reference clock.
@@ -288,6 +290,7 @@ impl Device {
             mailbox: MailboxHistory::default(),
             watchdog: Watchdog::default(),
             received: None,
+            up_time: None,
             sync_on: None,
             clock: ClockHistory::default(),
             sync_counts: BTreeMap::new(),

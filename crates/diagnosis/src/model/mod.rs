@@ -25,6 +25,7 @@ pub mod set_up;
 pub mod sii_image;
 pub mod spell;
 pub mod traffic;
+pub mod up_time;
 pub mod working_counter;
 
 use std::collections::VecDeque;
@@ -59,6 +60,7 @@ pub use set_up::{ClockSetUp, SetUp};
 pub use sii_image::{Power, SiiImage};
 pub use spell::Spell;
 pub use traffic::{Silence, Traffic};
+pub use up_time::UpTime;
 pub use working_counter::{Deficit, Ordered, WorkingCounterHistory};
 
 /// How many changes of one kind are kept of a controller; older ones are forgotten.

@@ -7,6 +7,9 @@
 //! its counters cleared, so it answers only to its position at first, and its neighbours have lost the
 //! links to it for a while. Links that are lost while the device keeps its state are no restart.
 //!
+//! How long the supply was away its own clock tells, which begins at 0 when the controller comes up, whatever time its links
+//! take after that; live, the diagnosis reads it (0x0910).
+//!
 //! **What it means.** For a fall to INIT the supply was gone: for a moment (brown-out), or for longer
 //! (device or supply off). When several SubDevices fall at the same moment, they share the supply that
 //! failed. When all terminals of a coupler fall, or all from one of them to the end, and the coupler does not,
@@ -16,6 +19,7 @@
 //! **What to do.** Measure the supply of the SubDevice under load, at the device; look what is switched
 //! at these moments.
 
+mod supply;
 mod terminal_bus;
 mod unseen;
 
@@ -241,7 +245,10 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     let device = fall.device;
     let is_several = together.len() > 1;
     let is_first = together.iter().all(|other| device.id <= other.device.id);
-    let was_long = together.iter().any(|one| one.was_long(model, together));
+    let was_long = match together.iter().filter_map(supply::away).max() {
+        Some(away) => away >= DIP,
+        None => together.iter().any(|one| one.was_long(model, together)),
+    };
     let feeder = is_first.then(|| terminal_bus::common_feeder(model, together)).flatten();
     let (cause, others) = match (was_long, is_several) {
         _ if feeder.is_some() => {
@@ -278,6 +285,7 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
         let seen = Seen::new((), since, None);
         condition = condition.shown_by(Evidence::register(device.id, AL_STATUS, &seen, text));
     }
+    condition.evidence.extend(supply::evidence(model, fall));
     if is_first {
         let mut follows = BTreeSet::new();
         for other in together {

@@ -27,6 +27,7 @@ fn cases_that_were_once_judged_wrongly_are_judged_right() {
     let cases = [
         (30_000_000, "a link that stays open when the one before it is mended"),
         (30_000_466, "damage within a SubDevice, and frames that are late by 5 % of the cycle"),
+        (223_384_000_048, "a dip of 0.6 ms on a line whose links need three seconds"),
         (223_384_000_150, "frames vanish in a line of 155 with a long cycle"),
         (223_384_000_158, "so many uneven frames that the first are not kept one by one"),
     ];

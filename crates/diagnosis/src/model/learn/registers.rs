@@ -11,7 +11,7 @@ use linesman_proto::time::{DcTime32, Instant};
 
 use super::{Answer, part, word_at};
 use crate::model::set_up::SYNC_MANAGERS;
-use crate::model::{Chip, Device, LoopWrite, NetworkModel, Seen};
+use crate::model::{Chip, Device, LoopWrite, NetworkModel, Seen, UpTime};
 
 const CHIP_TYPE: u16 = 0x0000;
 const CHIP_REVISION: u16 = 0x0001;
@@ -89,6 +89,11 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
         && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
     {
         device.received = Some(receive_times(times));
+        news = true;
+    } else if start.0 == UpTime::REGISTERS.0
+        && let Some(up_time) = UpTime::from_bytes(data, at)
+    {
+        device.up_time = Some(up_time);
         news = true;
     } else if start.0 > RECEIVE_TIMES
         && let Some(bytes) = part(data, start, CLOCK_DIFFERENCE, 4).and_then(|it| it.first_chunk())
