@@ -50,8 +50,16 @@ impl DcServo {
         let later = |(at, time): (Instant, i64)| time.wrapping_add(now.since(at).as_nanos() as i64);
         let near = self.time.map_or(epoch.0.wrapping_add(now.as_nanos()) as i64, later);
         let time = near.wrapping_add(i64::from(low.wrapping_sub(near as u32) as i32));
-        let is_first = self.time.replace((now, time)).is_none();
+        let before = self.time.replace((now, time));
+        let is_first = before.is_none();
         let cycle = i64::try_from(cycle.as_nanos()).unwrap_or(i64::MAX).max(1);
+        // A clock that stands, or was set meanwhile, says nothing of the phase.
+        let is_led_astray =
+            before.is_some_and(|before| (time - later(before)).abs() > cycle / JUMP);
+        if is_led_astray {
+            self.far_off = 0;
+            return (self.speed / INTEGRAL).clamp(-cycle / MOST, cycle / MOST);
+        }
         let phase = time.rem_euclid(cycle);
         let error = if phase > cycle / 2 { phase - cycle } else { phase };
         let most = cycle / MOST;
