@@ -43,6 +43,8 @@ fn place(table: &str) -> Option<(&'static str, &'static str)> {
         "WatchdogChoice" => (device!("watchdog = { "), " }"),
         "ClockChoice" => (device!("clock = { "), " }"),
         "Mapping" => (device!("[[device.mapping]]\n"), ""),
+        "SyncTimes" => (device!("sync_times = { "), " }"),
+        "DirectionTimes" => (device!("sync_times = { outputs = { "), " } }"),
         "StartUpEntry" => (device!("[[device.start_up]]\n"), ""),
         "EthernetChoice" => (device!("[[device.start_up]]\ntransition = \"IP\"\neoe = { "), " }"),
         "DescribedMailbox" => (device!("[device.description]\nmailbox = { "), " }"),
