@@ -49,16 +49,15 @@ impl DcServo {
         // The high half is that of the time it was set to, later that of the time before.
         let later = |(at, time): (Instant, i64)| time.wrapping_add(now.since(at).as_nanos() as i64);
         let near = self.time.map_or(epoch.0.wrapping_add(now.as_nanos()) as i64, later);
-        let time = near.wrapping_add(i64::from(low.wrapping_sub(near as u32) as i32));
-        let before = self.time.replace((now, time));
-        let is_first = before.is_none();
+        let ahead = i64::from(low.wrapping_sub(near as u32) as i32);
+        let time = near.wrapping_add(ahead);
+        let is_first = self.time.replace((now, time)).is_none();
+        let span = cycle;
         let cycle = i64::try_from(cycle.as_nanos()).unwrap_or(i64::MAX).max(1);
         // A clock that stands, or was set meanwhile, says nothing of the phase.
-        let is_led_astray =
-            before.is_some_and(|before| (time - later(before)).abs() > cycle / JUMP);
-        if is_led_astray {
+        if !is_first && ahead.abs() > cycle / JUMP {
             self.far_off = 0;
-            return (self.speed / INTEGRAL).clamp(-cycle / MOST, cycle / MOST);
+            return self.as_before(span);
         }
         let phase = time.rem_euclid(cycle);
         let error = if phase > cycle / 2 { phase - cycle } else { phase };
@@ -66,7 +65,7 @@ impl DcServo {
         if is_first || error.abs() > cycle / JUMP {
             self.far_off += 1;
             if !is_first && self.far_off < FAR_OFF {
-                return (self.speed / INTEGRAL).clamp(-most, most);
+                return self.as_before(span);
             }
             self.far_off = 0;
             // Later, never earlier: what is past cannot be sent.
@@ -135,5 +134,19 @@ mod tests {
         );
         assert_eq!([at(25, 200_000), at(26, 200_000)], [0; 2]);
         assert_eq!(at(27, 200_000), 800_000, "three in a row: it is the cycle that is off");
+    }
+
+    #[test]
+    fn clock_that_stands_does_not_move_the_cycle() {
+        let cycle = Span::ms(1);
+        let mut servo = DcServo::default();
+        servo.set_base(Some((1, DcTime(0))));
+        let mut at = |ms: u64, shown: u32| {
+            servo.correction(Instant::from_nanos(ms * 1_000_000), &shown.to_le_bytes(), cycle)
+        };
+        assert_eq!(at(1, 1_000_000), 0);
+        for ms in 2..50 {
+            assert_eq!(at(ms, 1_300_000), 0, "{ms} ms");
+        }
     }
 }
