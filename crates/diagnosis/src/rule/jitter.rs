@@ -171,10 +171,8 @@ fn spell<'a>(cyclic: &'a Cyclic, keeps_step: bool, away: &[&Absence]) -> Option<
         let is_own = |at: Instant| !away.iter().any(|absence| absence.disturbs(at));
         // Those before belong to it as long as none is missing in between.
         let mut earlier = all.earlier().filter(|earlier| {
-            let was_within = |absence: &&&Absence| {
-                absence.since.at >= earlier.first.at && absence.since.at <= earlier.last.at
-            };
-            is_own(earlier.first.at) && !away.iter().any(|absence| was_within(&absence))
+            let spell = earlier.first.at..=earlier.last.at;
+            is_own(earlier.first.at) && !away.iter().any(|one| spell.contains(&one.since.at))
         });
         for one in all.latest().iter().rev() {
             if off.last().is_some_and(|later| later.at.since(one.at) > TOGETHER) {
