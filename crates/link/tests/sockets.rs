@@ -367,7 +367,7 @@ fn without_privilege_the_way_to_get_it_is_told() {
 }
 
 #[test]
-#[allow(unsafe_code, reason = "the library forks by a program that it begins at once")]
+#[allow(unsafe_code, reason = "no program that is begun leaves a forked child behind")]
 fn a_lock_that_is_dropped_is_free_though_a_child_was_just_forked() {
     with_cable(|| {
         let lock = CardLock::take("va").unwrap();
