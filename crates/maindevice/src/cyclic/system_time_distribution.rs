@@ -13,18 +13,20 @@
 //!   when it answers again;
 //! * then its time must be what is expected, for a reference that has started anew shows the time since. As
 //!   long as those who watch the line know that it is gone, or that its clock is not set, that holds for each
-//!   frame: ARMW names a place in which somebody else may stand by then. Who shows the time there takes over
-//!   until the reference is back; who shows another one, as every clock does that nobody has set, is not
-//!   followed.
+//!   frame, and another one gives the time, which has followed the reference until then: FRMW names it by its
+//!   station address. ARMW would name a place, to which the reference comes back with a clock that nobody has
+//!   set.
 
 use linesman_config::plan::{DatagramPlan, Role};
-use linesman_proto::address::WorkingCounter;
+use linesman_proto::address::{StationAddress, WorkingCounter};
 use linesman_proto::command::Command;
 use linesman_proto::frame::DATAGRAM_HEADER_LEN;
 use linesman_proto::time::{Instant, Span};
 
 use crate::supervisor::ReferenceClock;
 
+/// Where the address of a SubDevice is in a datagram header, behind command and index.
+const ADP: usize = 2;
 /// Frames whose contents are remembered while they are out: with more, cycles overlap more than they may.
 const KEPT: usize = 4;
 /// How far the time of a reference that answers again may be off what is expected: frames leave late at times.
@@ -59,8 +61,21 @@ impl ClockDatagram {
 
     /// Makes it a read in a frame that is about to leave.
     fn read_only(&self, frame: &mut [u8]) {
-        if let Some(command) = frame.get_mut(self.data_at - DATAGRAM_HEADER_LEN) {
-            *command = self.reads.code();
+        self.set_command(self.reads, frame);
+    }
+
+    /// Makes it one of `station`, in a frame that is about to leave: a read, or one that hands its time round.
+    fn name(&self, station: StationAddress, read_only: bool, frame: &mut [u8]) {
+        self.set_command(if read_only { Command::Fprd } else { Command::Frmw }, frame);
+        let adp = self.data_at - DATAGRAM_HEADER_LEN + ADP;
+        if let Some(address) = frame.get_mut(adp..adp + size_of::<u16>()) {
+            address.copy_from_slice(&station.0.to_le_bytes());
+        }
+    }
+
+    fn set_command(&self, command: Command, frame: &mut [u8]) {
+        if let Some(code) = frame.get_mut(self.data_at - DATAGRAM_HEADER_LEN) {
+            *code = command.code();
         }
     }
 
@@ -170,13 +185,18 @@ impl SystemTimeDistribution {
         departed: Instant,
         frame: &mut [u8],
     ) {
-        let read_only = self.state != ReferenceState::Handed;
+        // With nobody to stand in, whoever is in the place of the reference is only asked.
+        let stand_in = self.known.stand_in.filter(|_| !self.known.stands);
+        let lost = !self.known.stands && stand_in.is_none();
+        let read_only = lost || self.state != ReferenceState::Handed;
         let time = if read_only { 0 } else { datagram.cut(self.expected(departed).unwrap_or(0)) };
         self.sent[self.next] = SentTime { index, departed, time, read_only };
         self.next = (self.next + 1) % KEPT;
         datagram.put(time, frame);
-        if read_only {
-            datagram.read_only(frame);
+        match stand_in {
+            Some(station) => datagram.name(station, read_only, frame),
+            None if read_only => datagram.read_only(frame),
+            None => {}
         }
     }
 
@@ -257,6 +277,8 @@ mod tests {
     const DATA_AT: usize = 26;
     const COMMAND_AT: usize = 16;
     const EPOCH: u64 = 850_000_000_000_000_000;
+    const REFERENCE: StationAddress = StationAddress(0x1001);
+    const STAND_IN: StationAddress = StationAddress(0x1002);
     const ALL: WorkingCounter = WorkingCounter(4);
     const ALL_BUT_ONE: WorkingCounter = WorkingCounter(3);
 
@@ -267,19 +289,22 @@ mod tests {
         cycle: u64,
         len: usize,
         known: ReferenceClock,
+        /// Whom the latest frame named.
+        named: StationAddress,
     }
 
     impl TestLine {
         fn new(command: Command, len: usize) -> Self {
-            let address = DatagramAddress::Physical(0x1001, SYSTEM_TIME.address);
+            let address = DatagramAddress::Physical(REFERENCE.0, SYSTEM_TIME.address);
             let role = Role::ReferenceClock;
             let (sync_unit, ownership) = (None, Vec::new());
             let planned = DatagramPlan { command, address, len, role, sync_unit, ownership };
             let datagram = ClockDatagram::new(&planned, DATA_AT).unwrap();
-            let known = ReferenceClock { base: Some((1, DcTime(EPOCH))), stands: true };
+            let known =
+                ReferenceClock { base: Some((1, DcTime(EPOCH))), stands: true, stand_in: None };
             let mut distribution = SystemTimeDistribution::default();
             distribution.learn(known);
-            Self { datagram, distribution, cycle: 0, len, known }
+            Self { datagram, distribution, cycle: 0, len, known, named: REFERENCE }
         }
 
         fn learn(&mut self, change: impl FnOnce(&mut ReferenceClock)) {
@@ -298,10 +323,13 @@ mod tests {
             self.cycle += 1;
             let mut frame = vec![0; DATA_AT + self.len + 2];
             frame[COMMAND_AT] = Command::Frmw.code();
+            let adp = COMMAND_AT + ADP;
+            frame[adp..adp + 2].copy_from_slice(&REFERENCE.0.to_le_bytes());
             let departed = Instant::from_nanos(self.cycle * 1_000_000);
             let index = self.cycle as u8;
             self.distribution.write(&self.datagram, index, departed, &mut frame);
             let (command, sent) = (frame[COMMAND_AT], self.datagram.time(&frame));
+            self.named = StationAddress(u16::from_le_bytes([frame[adp], frame[adp + 1]]));
             if let Some(time) = shows {
                 self.datagram.put(time, &mut frame);
             }
@@ -373,22 +401,45 @@ mod tests {
     }
 
     #[test]
-    fn somebody_else_in_the_place_of_a_lost_reference_takes_over_if_it_shows_the_time() {
+    fn another_one_gives_the_time_by_its_station_address_while_the_reference_is_lost() {
         for mut test_line in test_lines() {
-            test_line.learn(|known| known.stands = false);
+            test_line.pass(None);
+            test_line.learn(|known| {
+                known.stands = false;
+                known.stand_in = Some(STAND_IN);
+            });
+            // It is heard first: it must show the time.
+            let (command, _, brought) = test_line.pass_well();
+            assert_eq!((command, brought), (FPRD, Brought::Time));
+            assert_eq!(test_line.named, STAND_IN);
             for _ in 0..5 {
                 let (command, _, brought) = test_line.pass_well();
-                assert_eq!((command, brought), (FRMW, Brought::Time));
+                assert_eq!((command, brought, test_line.named), (FRMW, Brought::Time, STAND_IN));
             }
-            // A clock that nobody has set comes between.
+            // It has started anew before anybody knew.
             let (command, _, brought) = test_line.pass(Some(5_000_000));
             assert_eq!((command, brought), (FRMW, Brought::Nothing));
             for _ in 0..2_000 {
                 assert_eq!(test_line.pass(Some(5_000_000)), (FPRD, 0, Brought::Nothing));
             }
-            test_line.learn(|known| known.stands = true);
+            test_line.learn(|known| {
+                known.stands = true;
+                known.stand_in = None;
+            });
             let (command, _, brought) = test_line.pass_well();
-            assert_eq!((command, brought), (FRMW, Brought::Time));
+            assert_eq!((command, brought, test_line.named), (FRMW, Brought::Time, REFERENCE));
+        }
+    }
+
+    #[test]
+    fn nobody_is_written_to_while_the_reference_is_lost_and_nobody_can_stand_in() {
+        for mut test_line in test_lines() {
+            test_line.learn(|known| known.stands = false);
+            for _ in 0..5 {
+                let (command, sent, brought) = test_line.pass_well();
+                assert_eq!((command, sent, brought), (FPRD, 0, Brought::Time));
+                assert_eq!(test_line.named, REFERENCE);
+            }
         }
     }
 

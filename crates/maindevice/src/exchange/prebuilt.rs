@@ -151,8 +151,8 @@ impl Prebuilt {
                 Addressing::Position | Addressing::Broadcast => SAME & !ADP,
                 Addressing::Station | Addressing::Logical | Addressing::None => SAME,
             };
-            // What hands the reference's time round is a mere read at times.
-            let free = if role == Role::ReferenceClock { COMMAND } else { 0 };
+            // What hands the reference's time round is a mere read at times, and another one's at others.
+            let free = if role == Role::ReferenceClock { COMMAND | ADP } else { 0 };
             let masks = commands.map(|command| mask(command) & !free);
             DatagramShape { at: header, heads: commands.map(variant), masks }
         };
@@ -180,7 +180,10 @@ impl Prebuilt {
         let heads = shapes.iter().map(|shape| shape.at..shape.at + 2);
         let clocks = plan.datagrams.iter().zip(data_offsets(plan));
         let clocks = clocks.filter(|(one, _)| one.role == Role::ReferenceClock);
-        let times = clocks.map(|(one, data)| data..data + one.len);
+        let times = clocks.flat_map(|(one, data)| {
+            let adp = data - DATAGRAM_HEADER_LEN + 2;
+            [adp..adp + 2, data..data + one.len]
+        });
         let moving = joined(outputs().map(|(_, range)| range).chain(heads).chain(times));
         let fixed = gaps(BEHIND_ADDRESSES..len, moving);
         let mut copies = Copies::new(plan.repeats.saturating_add(1), ring);

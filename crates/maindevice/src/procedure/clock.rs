@@ -49,6 +49,8 @@ pub(crate) struct SeenClock {
     pub(crate) station: StationAddress,
     /// It has a clock.
     pub(crate) has_clock: bool,
+    /// It counts 64 bits, and not 32.
+    pub(crate) is_wide: bool,
     /// Local time at which its processing unit saw the latching frame.
     pub(crate) latched: u64,
     /// How long after the first clock of its line it did. `None` without a clock.
@@ -84,14 +86,14 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
         let information = EscInformation::from_bytes(information.await?.bytes(0));
         let station = StationAddress(station.await?.word(0));
         let dl_status = DlStatus(dl_status.await?.word(0));
-        seen.push((information.features.distributed_clocks(), station, dl_status));
+        seen.push((information.features, station, dl_status));
     }
     let at = wire.now();
     let all = register::RECEIVE_TIME.address;
     wire.ask(Request::write(Target::All, all, &[0; 4])).await?;
     let reading: Vec<_> = (places.iter().zip(&seen))
-        .map(|(place, (has_clock, ..))| {
-            has_clock.then(|| {
+        .map(|(place, (features, ..))| {
+            features.distributed_clocks().then(|| {
                 [
                     wire.read(*place, register::RECEIVE_TIME.address, 16),
                     wire.read(*place, register::RECEIVE_TIME_PROCESSING_UNIT.address, 8),
@@ -100,7 +102,7 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
         })
         .collect();
     let (mut clocks, mut controllers) = (Vec::new(), Vec::new());
-    for (reading, (has_clock, station, dl_status)) in reading.into_iter().zip(seen) {
+    for (reading, (features, station, dl_status)) in reading.into_iter().zip(seen) {
         let open = PortMap::from_fn(|port| dl_status.port_state(port).is_active());
         let (mut times, mut latched) = (None, 0);
         if let Some([ports, unit]) = reading {
@@ -108,13 +110,14 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
             latched = u64::from_le_bytes(unit.bytes(0));
             times = Some(ports).filter(Reply::answered);
         }
-        let has_clock = has_clock && times.is_some();
+        let has_clock = features.distributed_clocks() && times.is_some();
+        let is_wide = features.clock_64_bit();
         let received = |port: Port| {
             let times = times.as_ref().filter(|_| open[port])?;
             Some(DcTime32(u32::from_le_bytes(times.bytes(4 * port.index()))))
         };
         controllers.push(SeenController { open, received: PortMap::from_fn(received) });
-        clocks.push(SeenClock { station, has_clock, latched, delay: None });
+        clocks.push(SeenClock { station, has_clock, is_wide, latched, delay: None });
     }
     let half = places.iter().position(|place| place.card() == Some(Path::B));
     let half = half.filter(|_| wire.ring_intact() == Some(false)).unwrap_or(places.len());

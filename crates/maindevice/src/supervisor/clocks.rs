@@ -139,13 +139,13 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
             let offset = time.wrapping_add(delay.as_nanos()).wrapping_sub(clock.latched);
             let (wire, id) = (wire.clone(), device.id);
             let setting = async move { clock::set(&wire, station, offset, delay).await };
-            Some((id, context.wire.spawn(setting)))
+            Some((id, clock.is_wide, context.wire.spawn(setting)))
         })
         .collect();
-    for (id, set) in setting {
+    for (id, is_wide, set) in setting {
         // Who does not answer is found out by its supervisor.
         if set.await.is_ok() {
-            lock(&context.device_table).set_clock(id);
+            lock(&context.device_table).set_clock(id, is_wide);
         }
     }
     // The cycle follows from now on.

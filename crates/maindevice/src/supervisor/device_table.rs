@@ -49,6 +49,8 @@ struct DeviceEntry {
     mailbox: bool,
     /// Its clock was set since it was last without power.
     clock_set: bool,
+    /// That clock has 64 bits.
+    clock_wide: bool,
     /// That is the one of BOOT, for files only.
     boots: bool,
     /// How far it is to be driven; what the plan says unless asked for otherwise.
@@ -61,6 +63,13 @@ struct DeviceEntry {
     clears: u32,
 }
 
+impl DeviceEntry {
+    /// True if it can be reached, and its clock shows the time of all others.
+    const fn shows_time(&self) -> bool {
+        self.clock_set && matches!(self.found, Reachability::There { .. })
+    }
+}
+
 /// What is known of the clock that all others follow.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct ReferenceClock {
@@ -68,11 +77,13 @@ pub(crate) struct ReferenceClock {
     pub(crate) base: Option<(u32, DcTime)>,
     /// It is there, and its clock was set since it was last without power; true as long as nobody can know.
     pub(crate) stands: bool,
+    /// Who gives its time to the others while it does not; `None`: nobody is left who could, or none is needed.
+    pub(crate) stand_in: Option<StationAddress>,
 }
 
 impl Default for ReferenceClock {
     fn default() -> Self {
-        Self { base: None, stands: true }
+        Self { base: None, stands: true, stand_in: None }
     }
 }
 
@@ -102,6 +113,8 @@ pub(crate) struct DeviceTable {
     clocks_ready: bool,
     /// Whom all other clocks follow: its address, and who it is if the plan has it.
     reference: Option<(StationAddress, Option<DeviceId>)>,
+    /// The planned station addresses, by [`DeviceId`].
+    stations: Vec<StationAddress>,
 }
 
 impl DeviceTable {
@@ -114,7 +127,8 @@ impl DeviceTable {
         };
         let devices = plan.devices.iter().map(live).collect();
         let times = Some(BringUpTimes::new(count));
-        Self { devices, changed, times, ..Self::default() }
+        let stations = plan.devices.iter().map(|device| device.station).collect();
+        Self { devices, changed, times, stations, ..Self::default() }
     }
 
     /// Changes whenever presence or "settled" changes.
@@ -177,7 +191,7 @@ impl DeviceTable {
         let losses =
             live.losses + u32::from(found == Reachability::Lost && before != Reachability::Lost);
         // What was seen and asked for outlives a loss; what it serves does not.
-        let DeviceEntry { openings, reached, target, requests, clock_set, .. } = *live;
+        let DeviceEntry { openings, reached, target, requests, clock_set, clock_wide, .. } = *live;
         let clock_set = clock_set && found != Reachability::There { restarted: true };
         let new = DeviceEntry {
             found,
@@ -188,6 +202,7 @@ impl DeviceTable {
             requests,
             losses,
             clock_set,
+            clock_wide,
             ..DeviceEntry::default()
         };
         *live = new;
@@ -266,10 +281,10 @@ impl DeviceTable {
         self.all_reached
     }
 
-    /// The clock of a SubDevice was set.
-    pub(crate) fn set_clock(&mut self, id: DeviceId) {
+    /// The clock of a SubDevice was set: one of 64 bits if it is `wide`, else of 32.
+    pub(crate) fn set_clock(&mut self, id: DeviceId, wide: bool) {
         if let Some(live) = self.live(id) {
-            live.clock_set = true;
+            (live.clock_set, live.clock_wide) = (true, wide);
         }
     }
 
@@ -288,9 +303,18 @@ impl DeviceTable {
     /// How the clock is that all others follow.
     pub(crate) fn clock(&self) -> ReferenceClock {
         let reference = self.reference.and_then(|(_, id)| self.devices.get(id?.index()));
-        let stands = reference
-            .is_none_or(|live| live.clock_set && matches!(live.found, Reachability::There { .. }));
-        ReferenceClock { base: self.clock_base, stands }
+        let stands = reference.is_none_or(DeviceEntry::shows_time);
+        let stand_in = if stands { None } else { self.stand_in() };
+        ReferenceClock { base: self.clock_base, stands, stand_in }
+    }
+
+    /// Who gives the time while the reference does not: the first in the order of processing, so that most are
+    /// behind it, of those that have the time of all. One of 32 bits would give the others an upper half of zeros.
+    fn stand_in(&self) -> Option<StationAddress> {
+        let with_time =
+            || self.devices.iter().zip(&self.stations).filter(|(it, _)| it.shows_time());
+        let wide = with_time().find(|(live, _)| live.clock_wide);
+        wide.or_else(|| with_time().next()).map(|(_, station)| *station)
     }
 
     /// Whose clock all others follow.
