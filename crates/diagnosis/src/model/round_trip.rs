@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 
+use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
 use super::PathDelays;
@@ -99,8 +100,8 @@ struct DelayBucket {
 pub struct RoundTripTimes {
     /// By length in bytes.
     usual: BTreeMap<usize, LengthTimes>,
-    /// Until when the frames before are on their way out of the card.
-    busy_until: Instant,
+    /// Until when the frames before are on their way out of each card: those of a ring send at the same time.
+    busy_until: [Instant; 2],
     /// Frames that came back.
     frames: u64,
     /// Those since the latest late one; all, if none was.
@@ -161,11 +162,31 @@ impl LengthTimes {
 }
 
 impl RoundTripTimes {
-    /// A frame of `len` bytes came back. Says whether it is news.
-    pub fn record(&mut self, sent: Instant, back: Instant, frame: u64, len: usize) -> bool {
+    /// A frame of `len` bytes went out by a card; by the first one where that is not known. Gives when its first bit
+    /// left, which the frames before it on that card may have kept waiting.
+    pub fn depart(
+        &mut self,
+        sent: Instant,
+        back: Instant,
+        len: usize,
+        card: Option<Path>,
+    ) -> Instant {
         let duration = Span::ns((len as u64).max(SHORTEST).saturating_add(AROUND) * BYTE);
-        let leaves = sent.max(self.busy_until.min(back));
-        self.busy_until = leaves + duration;
+        let busy_until = &mut self.busy_until[card.unwrap_or_default().index()];
+        let leaves = sent.max((*busy_until).min(back));
+        *busy_until = leaves + duration;
+        leaves
+    }
+
+    /// A frame of `len` bytes whose first bit left at `leaves` came back. Says whether it is news.
+    pub fn record(
+        &mut self,
+        sent: Instant,
+        leaves: Instant,
+        back: Instant,
+        frame: u64,
+        len: usize,
+    ) -> bool {
         let took = back.since(leaves).as_nanos();
         self.path_delays.record(len, took, sent);
         if self.usual.len() >= LENGTHS && !self.usual.contains_key(&len) {
@@ -264,11 +285,23 @@ impl RoundTripTimes {
 mod tests {
     use super::*;
 
+    fn take(
+        round_trips: &mut RoundTripTimes,
+        sent: Instant,
+        back: Instant,
+        frame: u64,
+        len: usize,
+        card: Option<Path>,
+    ) {
+        let leaves = round_trips.depart(sent, back, len, card);
+        round_trips.record(sent, leaves, back, frame, len);
+    }
+
     /// A frame a millisecond, of 64 bytes; each takes so many µs.
     fn play(round_trips: &mut RoundTripTimes, from: u64, took_us: &[u64]) {
         for (ms, us) in (from..).zip(took_us) {
             let sent = Instant::from_nanos(ms * 1_000_000);
-            round_trips.record(sent, sent + Span::us(*us), ms, 64);
+            take(round_trips, sent, sent + Span::us(*us), ms, 64, None);
         }
     }
 
@@ -302,10 +335,33 @@ mod tests {
             for nth in 0..4_u64 {
                 // 1514 bytes and what is around them take 123.04 µs.
                 let back = sent + Span::ns(200_000 + nth * 123_040);
-                round_trips.record(sent, back, burst, 1514);
+                take(&mut round_trips, sent, back, burst, 1514, None);
             }
         }
         assert_eq!(round_trips.late_count, 0);
+    }
+
+    /// While two cards send long frames at once, neither waits for the other: a frame behind them took no less time.
+    #[test]
+    fn frames_of_one_card_do_not_wait_for_those_of_the_other() {
+        let mut round_trips = RoundTripTimes::default();
+        for cycle in 0..600_u64 {
+            let sent = Instant::from_nanos(cycle * 1_000_000);
+            let is_busy = cycle % 100 == 50;
+            for nth in 0..if is_busy { 4_u64 } else { 0 } {
+                let back = sent + Span::ns(200_000 + nth * 123_040);
+                for card in Path::ALL {
+                    take(&mut round_trips, sent, back, cycle, 1514, Some(card));
+                }
+            }
+            let waits = if is_busy { 4 * 123_040 } else { 0 };
+            let back = sent + Span::ns(20_000 + waits);
+            for card in Path::ALL {
+                take(&mut round_trips, sent, back, cycle, 64, Some(card));
+            }
+        }
+        let usual = &round_trips.usual[&64];
+        assert_eq!((usual.shortest, round_trips.late_count), (20_000, 0));
     }
 
     #[test]

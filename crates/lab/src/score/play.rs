@@ -342,6 +342,10 @@ impl<'a> Play<'a> {
                 if self.options.keeps_heard {
                     report.heard = self.heard(None);
                 }
+                if self.options.keeps_reports {
+                    report.plant = Some(Box::new(self.case.file.clone()));
+                    report.reports = Some(Box::new([self.lab.diagnosis(), self.recorded()]));
+                }
                 return Ok(report);
             }
             self.break_line(&mut active)?;

@@ -100,9 +100,10 @@ impl Learner {
         request: Option<&FrameCopy<'_>>,
         reply: &FrameCopy<'_>,
     ) {
-        if let Some(request) = request.filter(|_| exchange.is_last) {
+        if let Some(request) = request {
             let (sent, back, len) = (request.time, reply.time, reply.bytes.len());
-            if model.round_trips.record(sent, back, reply.number, len) {
+            let leaves = model.round_trips.depart(sent, back, len, exchange.sent_by);
+            if exchange.is_last && model.round_trips.record(sent, leaves, back, reply.number, len) {
                 model.touch();
             }
         }
