@@ -6,6 +6,7 @@
 
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::{CutHeader, FrameView};
+use linesman_proto::register::SYSTEM_TIME;
 
 /// Both halves of a frame, hashed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -28,6 +29,19 @@ pub struct Fingerprint {
     pub first_index: u8,
     /// Whether the walk over the datagrams ended too early.
     pub is_cut: bool,
+}
+
+/// A command code as it is compared. In a ring one of the two copies of a frame may only ask the reference clock for the
+/// time that the other one hands round.
+fn without_handing(code: u8, address: u32) -> u8 {
+    if address >> 16 != u32::from(SYSTEM_TIME.address.0) {
+        return code;
+    }
+    match Command::from_code(code) {
+        Some(Command::Armw) => Command::Aprd.code(),
+        Some(Command::Frmw) => Command::Fprd.code(),
+        _ => code,
+    }
 }
 
 impl Fingerprint {
@@ -60,7 +74,8 @@ impl Fingerprint {
             let (lasting, changing) =
                 if is_position { (address >> 16, address & 0xFFFF) } else { (address, 0) };
             let tail = u64::from(datagram.index()) << 48 | (datagram.data_len() as u64) << 32;
-            let head = u64::from(datagram.code()) << 56 | tail;
+            let head =
+                u64::from(without_handing(datagram.code(), datagram.logical().0)) << 56 | tail;
             let wkc = u64::from(datagram.wkc().0);
             print.skeleton = mix(print.skeleton, tail | address);
             print.commands += u32::from(datagram.command() != Some(Command::Nop));
@@ -88,7 +103,8 @@ impl Fingerprint {
             }
         };
         let tail = u64::from(header.index) << 48 | u64::from(header.len) << 32;
-        self.lasting = mix(self.lasting, u64::from(header.code) << 56 | tail | u64::from(address));
+        let code = without_handing(header.code, header.address);
+        self.lasting = mix(self.lasting, u64::from(code) << 56 | tail | u64::from(address));
         self.changing = mix(self.changing, u64::from(header.address ^ address));
         self.skeleton = mix(self.skeleton, tail | u64::from(address));
     }

@@ -107,6 +107,16 @@ impl Answer<'_> {
     }
 }
 
+/// The command of what came back, of the copy of a ring's frame that hands the system time round if the other one only
+/// asks for it.
+fn handed(command: Command, request: Option<Datagram<'_>>) -> Command {
+    match (command, request.and_then(|request| request.command())) {
+        (Command::Aprd, Some(Command::Armw)) => Command::Armw,
+        (Command::Fprd, Some(Command::Frmw)) => Command::Frmw,
+        _ => command,
+    }
+}
+
 /// The datagrams of a frame that came back, one by one; `None` for one whose command is not known.
 pub fn answers<'a>(
     exchange: &'a Exchange<'_>,
@@ -125,6 +135,7 @@ pub fn answers<'a>(
         let sum = exchange.added(index, sent, datagram.wkc().0);
         let own = datagram.wkc().0.saturating_sub(sent);
         let Some(command) = datagram.command() else { return Some(None) };
+        let command = handed(command, request);
         if exchange.is_part && sum == 0 {
             return None;
         }
