@@ -68,12 +68,14 @@ impl Cyclic {
         let Self { frames, batches, time_distribution, deadline, .. } = self;
         let Some(frame) = frames.get(index) else { return };
         let batch = batches.get(frame.batch);
+        let mut second_copy = None;
         if let (Some(clock), Some(batch)) = (&frame.clock, batch) {
             let [first, ..] = number.to_le_bytes();
-            time_distribution.write(clock, first, deadline.before(batch.cycle), sent);
+            let departed = deadline.before(batch.cycle);
+            second_copy = time_distribution.write(clock, first, departed, sent);
         }
         if frame.prebuilt.is_copied() {
-            exchange.keep_copies(index as u32, number, sent);
+            exchange.keep_copies(index as u32, number, sent, second_copy);
         }
     }
 

@@ -16,6 +16,10 @@
 //!   frame, and another one gives the time, which has followed the reference until then: FRMW names it by its
 //!   station address. ARMW would name a place, to which the reference comes back with a clock that nobody has
 //!   set.
+//!
+//! In an open ring only one of the two copies of a frame meets the reference, and what the other one would hand round
+//! reaches SubDevices by another way than the one whose delay they know. So the copy of the second card only asks for
+//! the time, until it is known what is right there ([`ReferenceClock::second_card_ns`]).
 
 use linesman_config::plan::{DatagramPlan, Role};
 use linesman_proto::address::{StationAddress, WorkingCounter};
@@ -23,6 +27,7 @@ use linesman_proto::command::Command;
 use linesman_proto::frame::DATAGRAM_HEADER_LEN;
 use linesman_proto::time::{Instant, Span};
 
+use crate::exchange::SecondCopy;
 use crate::supervisor::ReferenceClock;
 
 /// Where the address of a SubDevice is in a datagram header, behind command and index.
@@ -177,27 +182,39 @@ impl SystemTimeDistribution {
         }
     }
 
-    /// Completes a frame with this index byte that leaves at `departed`.
+    /// Completes a frame with this index byte that leaves at `departed`. Gives what is otherwise in its copy that
+    /// the second card of a ring sends.
     pub(super) fn write(
         &mut self,
         datagram: &ClockDatagram,
         index: u8,
         departed: Instant,
         frame: &mut [u8],
-    ) {
+    ) -> Option<SecondCopy> {
         // With nobody to stand in, whoever is in the place of the reference is only asked.
-        let stand_in = self.known.stand_in.filter(|_| !self.known.stands);
-        let lost = !self.known.stands && stand_in.is_none();
+        let named = self.known.named;
+        let lost = !self.known.stands && named.is_none();
         let read_only = lost || self.state != ReferenceState::Handed;
         let time = if read_only { 0 } else { datagram.cut(self.expected(departed).unwrap_or(0)) };
         self.sent[self.next] = SentTime { index, departed, time, read_only };
         self.next = (self.next + 1) % KEPT;
         datagram.put(time, frame);
-        match stand_in {
+        match named {
             Some(station) => datagram.name(station, read_only, frame),
             None if read_only => datagram.read_only(frame),
             None => {}
         }
+        if read_only {
+            return None;
+        }
+        let (command, time) = match self.known.second_card_ns {
+            Some(by) => (None, time.wrapping_add_signed(by)),
+            None => (Some(if named.is_some() { Command::Fprd } else { datagram.reads }), 0),
+        };
+        let handing = frame.get(datagram.data_at - DATAGRAM_HEADER_LEN).copied();
+        let command = command.or(handing.and_then(Command::from_code))?;
+        let (data_at, len) = (datagram.data_at, datagram.len);
+        Some(SecondCopy { data_at, len, command, time: time.to_le_bytes() })
     }
 
     /// A frame with this index byte came back.
@@ -291,6 +308,8 @@ mod tests {
         known: ReferenceClock,
         /// Whom the latest frame named.
         named: StationAddress,
+        /// What was otherwise in its copy of the second card.
+        second: Option<SecondCopy>,
     }
 
     impl TestLine {
@@ -300,11 +319,15 @@ mod tests {
             let (sync_unit, ownership) = (None, Vec::new());
             let planned = DatagramPlan { command, address, len, role, sync_unit, ownership };
             let datagram = ClockDatagram::new(&planned, DATA_AT).unwrap();
-            let known =
-                ReferenceClock { base: Some((1, DcTime(EPOCH))), stands: true, stand_in: None };
+            let known = ReferenceClock {
+                base: Some((1, DcTime(EPOCH))),
+                stands: true,
+                named: None,
+                second_card_ns: None,
+            };
             let mut distribution = SystemTimeDistribution::default();
             distribution.learn(known);
-            Self { datagram, distribution, cycle: 0, len, known, named: REFERENCE }
+            Self { datagram, distribution, cycle: 0, len, known, named: REFERENCE, second: None }
         }
 
         fn learn(&mut self, change: impl FnOnce(&mut ReferenceClock)) {
@@ -327,7 +350,7 @@ mod tests {
             frame[adp..adp + 2].copy_from_slice(&REFERENCE.0.to_le_bytes());
             let departed = Instant::from_nanos(self.cycle * 1_000_000);
             let index = self.cycle as u8;
-            self.distribution.write(&self.datagram, index, departed, &mut frame);
+            self.second = self.distribution.write(&self.datagram, index, departed, &mut frame);
             let (command, sent) = (frame[COMMAND_AT], self.datagram.time(&frame));
             self.named = StationAddress(u16::from_le_bytes([frame[adp], frame[adp + 1]]));
             if let Some(time) = shows {
@@ -406,7 +429,7 @@ mod tests {
             test_line.pass(None);
             test_line.learn(|known| {
                 known.stands = false;
-                known.stand_in = Some(STAND_IN);
+                known.named = Some(STAND_IN);
             });
             // It is heard first: it must show the time.
             let (command, _, brought) = test_line.pass_well();
@@ -424,10 +447,28 @@ mod tests {
             }
             test_line.learn(|known| {
                 known.stands = true;
-                known.stand_in = None;
+                known.named = None;
             });
             let (command, _, brought) = test_line.pass_well();
             assert_eq!((command, brought, test_line.named), (FRMW, Brought::Time, REFERENCE));
+        }
+    }
+
+    #[test]
+    fn the_copy_of_the_second_card_only_asks_until_it_is_known_what_is_right_there() {
+        for mut test_line in test_lines() {
+            test_line.pass_well();
+            let second = test_line.second.unwrap();
+            assert_eq!((second.command, second.time), (Command::Fprd, [0; 8]));
+            test_line.learn(|known| known.second_card_ns = Some(-500));
+            let (_, sent, _) = test_line.pass_well();
+            let second = test_line.second.unwrap();
+            let time = test_line.datagram.cut(u64::from_le_bytes(second.time));
+            assert_eq!((second.command, time), (Command::Frmw, sent - 500));
+            // Where the first one only asks, so does the second.
+            test_line.pass(None);
+            test_line.pass(None);
+            assert_eq!(test_line.second, None);
         }
     }
 

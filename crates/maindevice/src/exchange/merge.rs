@@ -8,14 +8,22 @@
 //! * logical reads are ORed byte by byte: what is read is sent as zeros, so the bytes of a SubDevice
 //!   are zero in the copy that did not reach it, and outputs are the same in both;
 //! * addressed reads come from the copy that was answered; what is read from one SubDevice and written to the
-//!   others (ARMW, FRMW), from the copy that met the one that is read.
+//!   others (ARMW, FRMW), from the copy that met the one that is read, and from that of card A if neither did.
 
+use std::ops::Range;
+
+use linesman_proto::address::Path;
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::frame::{FrameView, WKC_LEN};
 
-/// Merges the datagrams of `second` into `first`. Both are frames that match the one that was `sent`,
-/// so that their datagrams lie at the same places.
-pub(crate) fn merge(first: &mut [u8], second: &[u8], sent: &[u8]) {
+/// Merges the datagrams of `second` into `first`, which card `card` had sent. Both are frames that match the one that
+/// was sent, so that their datagrams lie at the same places. `sent` gives the data that a card sent at some place.
+pub(crate) fn merge<'a>(
+    first: &mut [u8],
+    card: Path,
+    second: &[u8],
+    sent: impl Fn(Path, Range<usize>) -> Option<&'a [u8]>,
+) {
     let Ok(view) = FrameView::parse(second) else { return };
     for datagram in view.datagrams().map_while(Result::ok) {
         let data = datagram.data_range();
@@ -34,15 +42,19 @@ pub(crate) fn merge(first: &mut [u8], second: &[u8], sent: &[u8]) {
         let ors = command.is_some_and(|command| {
             matches!(command.addressing(), Addressing::Broadcast | Addressing::Logical)
         });
+        let is_seconds = match command.is_some_and(hands_round) {
+            true => {
+                let met = |card, bytes: &[u8]| sent(card, data.clone()) != bytes.get(data.clone());
+                let by_first = met(card, first);
+                !by_first && (card == Path::B || met(card.other(), second))
+            }
+            false => theirs > 0 && ours == 0,
+        };
         if ors && ours > 0 && theirs > 0 {
             for (mine, other) in first[data.clone()].iter_mut().zip(datagram.data()) {
                 *mine |= other;
             }
-        } else if theirs > 0
-            && (ours == 0
-                || command.is_some_and(hands_round)
-                    && sent.get(data.clone()) == Some(&first[data.clone()]))
-        {
+        } else if is_seconds {
             first[data.clone()].copy_from_slice(datagram.data());
             first[at + 2..at + 4].copy_from_slice(&second[at + 2..at + 4]);
         }
@@ -81,14 +93,33 @@ mod tests {
         bytes
     }
 
-    /// In a broken ring the reference is in one half; the other half took what was sent, and counted it.
+    /// In a broken ring the reference is in one half; the other half took what was sent, and counted it. The second card
+    /// may have sent another time than the first one.
     #[test]
     fn the_reference_time_comes_from_the_half_where_the_reference_is() {
-        let (sent, time) = ([7, 0, 0, 0], [9, 8, 0, 0]);
-        for (first, second) in [((sent, 2), (time, 3)), ((time, 3), (sent, 2))] {
-            let mut merged = frame(first.0, first.1);
-            merge(&mut merged, &frame(second.0, second.1), &frame(sent, 0));
-            assert_eq!(merged[26..32], [9, 8, 0, 0, 5, 0]);
+        let time = [9, 8, 0, 0];
+        for sent in [[[7, 0, 0, 0], [7, 0, 0, 0]], [[7, 0, 0, 0], [5, 0, 0, 0]]] {
+            let by = |card: Path, _| Some(&sent[card.index()][..]);
+            for first in Path::ALL {
+                let second = first.other();
+                for met in Path::ALL {
+                    let data = |card: Path| if card == met { time } else { sent[card.index()] };
+                    let mut merged = frame(data(first), 2);
+                    merge(&mut merged, first, &frame(data(second), 3), by);
+                    assert_eq!(
+                        merged[26..32],
+                        [9, 8, 0, 0, 5, 0],
+                        "{first:?} back first, {met:?} met it"
+                    );
+                }
+                let mut merged = frame(sent[first.index()], 2);
+                merge(&mut merged, first, &frame(sent[second.index()], 3), by);
+                assert_eq!(
+                    merged[26..32],
+                    [7, 0, 0, 0, 5, 0],
+                    "{first:?} back first, nobody met it"
+                );
+            }
         }
     }
 }

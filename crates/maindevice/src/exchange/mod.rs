@@ -27,6 +27,7 @@ pub use request::{Access, DatagramData, ExchangeError, Reply, Request, Target};
 
 use outgoing::Outgoing;
 use prebuilt::Prebuilt;
+pub(crate) use prebuilt::SecondCopy;
 pub(crate) use queue::{Queued, Ticket};
 pub(crate) use receive::Received;
 use receive::{Origin, marked, origin};
@@ -213,11 +214,17 @@ impl Exchange {
     }
 
     /// The same frame is to be sent by other cards, or again: these copies, outputs and all, wait to be
-    /// fetched by [`Exchange::poll_transmit`].
+    /// fetched by [`Exchange::poll_transmit`]. Those of the second card are otherwise where that is given.
     #[cold]
-    pub(crate) fn keep_copies(&mut self, frame: u32, number: u32, sent: &[u8]) {
+    pub(crate) fn keep_copies(
+        &mut self,
+        frame: u32,
+        number: u32,
+        sent: &[u8],
+        second_copy: Option<SecondCopy>,
+    ) {
         let Some(prebuilt) = self.cyclic.get_mut(frame as usize) else { return };
-        prebuilt.keep(sent);
+        prebuilt.keep(sent, second_copy);
         let [at, ..] = number.to_le_bytes();
         self.outgoing.push(at);
     }
@@ -259,18 +266,21 @@ impl Exchange {
                 self.outgoing.pop();
             }
             let purpose = slot.purpose;
-            let bytes = match purpose {
+            let (bytes, second) = match purpose {
                 Purpose::Cyclic { frame } => match self.cyclic.get(frame as usize) {
-                    Some(prebuilt) => prebuilt.bytes(),
+                    Some(prebuilt) => (prebuilt.bytes(), prebuilt.second_copy()),
                     None => continue,
                 },
-                Purpose::Acyclic => &slot.sent,
+                Purpose::Acyclic => (&*slot.sent, None),
             };
             let len = bytes.len();
             let Some(out) = buffer.get_mut(..len) else { continue };
             out.copy_from_slice(bytes);
             if path == Path::B {
                 out[6..12].copy_from_slice(&self.sources[1].0);
+                if let Some(second) = second {
+                    second.put(out);
+                }
             }
             if purpose == Purpose::Acyclic {
                 slot::mask(out, &slot.cards, path);

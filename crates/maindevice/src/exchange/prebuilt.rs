@@ -9,6 +9,7 @@
 use std::ops::Range;
 
 use linesman_config::plan::{DatagramPlan, FramePlan, Role};
+use linesman_proto::address::Path;
 use linesman_proto::command::{Addressing, Command};
 use linesman_proto::ethernet::{HEADER_LEN, MAX_LEN, MacAddress};
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, FrameBuilder};
@@ -78,6 +79,36 @@ enum FramePiece {
     Bytes(Range<usize>),
 }
 
+/// What is otherwise in the copy of a frame that the second card of a ring sends: whether the system time is handed
+/// round there, and which.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct SecondCopy {
+    /// Where the data of its datagram begin in the frame, and how many bytes of a time they are.
+    pub(crate) data_at: usize,
+    pub(crate) len: usize,
+    /// Its command.
+    pub(crate) command: Command,
+    /// Its time.
+    pub(crate) time: [u8; 8],
+}
+
+impl SecondCopy {
+    fn time(&self) -> &[u8] {
+        &self.time[..self.len.min(self.time.len())]
+    }
+
+    /// Changes a copy that is about to leave.
+    pub(super) fn put(&self, frame: &mut [u8]) {
+        let time = self.time();
+        if let Some(data) = frame.get_mut(self.data_at..self.data_at + time.len()) {
+            data.copy_from_slice(time);
+        }
+        if let Some(code) = frame.get_mut(self.data_at.wrapping_sub(DATAGRAM_HEADER_LEN)) {
+            *code = self.command.code();
+        }
+    }
+}
+
 /// A cyclic frame as card A sends it. Who sends it has it at hand beside what else there is to it; the
 /// exchange has another for what comes back otherwise than nearly always.
 #[derive(Clone, Debug)]
@@ -91,6 +122,8 @@ pub(crate) struct Prebuilt {
     /// What comes back as it was sent if nobody had a hand in it, but for what
     /// [`Prebuilt::matches`] compares.
     fixed: Vec<Range<usize>>,
+    /// What is otherwise in copies of the second card.
+    second_copy: Option<SecondCopy>,
     /// What becomes of the copies behind the first.
     copies: Copies,
     /// Which of the plan's it is, where its only answer is waited for; else [`Slot::NONE`].
@@ -190,7 +223,18 @@ impl Prebuilt {
         copies.unsent -= 1;
         let awaited = if ring { Slot::NONE } else { index };
         let first = shapes.first().copied().unwrap_or(DatagramShape::NONE);
-        Self { bytes, pieces, beginning, fixed, copies, awaited, first, shapes, len: at }
+        Self {
+            bytes,
+            pieces,
+            beginning,
+            fixed,
+            second_copy: None,
+            copies,
+            awaited,
+            first,
+            shapes,
+            len: at,
+        }
     }
 
     /// How many bytes it has.
@@ -263,10 +307,24 @@ impl Prebuilt {
         }
     }
 
-    /// Keeps the frame as it was sent, for the copies that follow.
+    /// Keeps the frame as it was sent, for the copies that follow, and what of them is otherwise.
     #[cold]
-    pub(super) fn keep(&mut self, sent: &[u8]) {
+    pub(super) fn keep(&mut self, sent: &[u8], second_copy: Option<SecondCopy>) {
         self.bytes.copy_from_slice(sent);
+        self.second_copy = second_copy;
+    }
+
+    /// What is otherwise in copies of the second card.
+    #[inline]
+    pub(super) const fn second_copy(&self) -> Option<&SecondCopy> {
+        self.second_copy.as_ref()
+    }
+
+    /// Data as this card has sent them.
+    pub(super) fn sent_by(&self, card: Path, data: Range<usize>) -> Option<&[u8]> {
+        let is_other = |it: &&SecondCopy| card == Path::B && it.data_at == data.start;
+        let other = self.second_copy.as_ref().filter(is_other);
+        other.map(SecondCopy::time).or_else(|| self.bytes.get(data))
     }
 
     /// Whether copies of it are to follow.

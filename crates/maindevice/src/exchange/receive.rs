@@ -4,7 +4,7 @@ use linesman_proto::address::Path;
 use linesman_proto::ethernet::{ETHERTYPE_ETHERCAT, MAX_LEN, MacAddress, SOURCE_MARK};
 use linesman_proto::time::Instant;
 
-use super::prebuilt::{FIRST_HEAD_END, FIRST_INDEX, Prebuilt, Shaped};
+use super::prebuilt::{FIRST_HEAD_END, FIRST_INDEX, Shaped};
 use super::{Exchange, Purpose, Slot, SlotState, merge};
 
 /// Offset of the source address in a frame.
@@ -156,13 +156,15 @@ impl Exchange {
         if slot.reply.is_empty() {
             slot.reply.extend_from_slice(frame);
         } else {
-            let sent = match slot.purpose {
-                Purpose::Cyclic { frame } => {
-                    self.cyclic.get(frame as usize).map_or(&[][..], Prebuilt::bytes)
-                }
-                Purpose::Acyclic => &slot.sent,
+            let Slot { purpose, sent, reply, .. } = slot;
+            let prebuilt = match *purpose {
+                Purpose::Cyclic { frame } => self.cyclic.get(frame as usize),
+                Purpose::Acyclic => None,
             };
-            merge::merge(&mut slot.reply, frame, sent);
+            merge::merge(reply, sender.other(), frame, |card, data| match prebuilt {
+                Some(prebuilt) => prebuilt.sent_by(card, data),
+                None => sent.get(data),
+            });
         }
         if slot.is_complete() {
             self.retire(at, SlotState::Answered);

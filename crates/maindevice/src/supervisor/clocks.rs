@@ -15,6 +15,10 @@ use crate::executor::lock;
 use crate::procedure::clock::{self, ClockError, Latch, SeenClock};
 use crate::procedure::state::StepError;
 
+/// A ring that is opened for a measurement is closed again by then, at the latest.
+const OPENED: Span = Span::s(1);
+/// And frames have shown by then that it is.
+const SEEN: Span = Span::ms(20);
 /// How often a clock that settles is looked at.
 const LOOK: Span = Span::ms(2);
 
@@ -93,6 +97,7 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     if let Some((station, control)) = opened {
         let bytes = control.to_bytes();
         let _ = wire.write_one(station, register::DL_CONTROL.address, &bytes).await;
+        lock(&context.device_table).opened_until = wire.now() + SEEN;
     }
     let Latch { at, clocks } = latched?;
     let epoch = context.options.clock_epoch;
@@ -172,6 +177,7 @@ async fn open_ring(context: &Context) -> Result<Option<(Target, DlControl)>, Clo
     let reply = wire.read_one(target, control.address, control.len).await?;
     let before = DlControl::from_bytes(reply.bytes(0));
     let closed = before.with_loop_mode(port, LoopMode::Closed).to_bytes();
+    lock(&context.device_table).opened_until = wire.now() + OPENED;
     wire.write_one(target, control.address, &closed).await?;
     Ok(Some((target, before)))
 }

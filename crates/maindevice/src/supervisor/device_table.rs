@@ -77,13 +77,18 @@ pub(crate) struct ReferenceClock {
     pub(crate) base: Option<(u32, DcTime)>,
     /// It is there, and its clock was set since it was last without power; true as long as nobody can know.
     pub(crate) stands: bool,
-    /// Who gives its time to the others while it does not; `None`: nobody is left who could, or none is needed.
-    pub(crate) stand_in: Option<StationAddress>,
+    /// Whom frames name by its station address, whatever is planned: in a ring the reference, for somebody else stands
+    /// in its position in the other half once the ring is open; while the reference does not stand, who gives its
+    /// time to the others, `None` if nobody is left who could.
+    pub(crate) named: Option<StationAddress>,
+    /// While the ring is open: what to add, in ns, to the time that frames of the second card hand round. `None`: they
+    /// hand none round.
+    pub(crate) second_card_ns: Option<i64>,
 }
 
 impl Default for ReferenceClock {
     fn default() -> Self {
-        Self { base: None, stands: true, stand_in: None }
+        Self { base: None, stands: true, named: None, second_card_ns: None }
     }
 }
 
@@ -115,6 +120,12 @@ pub(crate) struct DeviceTable {
     reference: Option<(StationAddress, Option<DeviceId>)>,
     /// The planned station addresses, by [`DeviceId`].
     stations: Vec<StationAddress>,
+    /// Two cards send each frame.
+    is_ring: bool,
+    /// [`ReferenceClock::second_card_ns`], once that is known.
+    second_card_ns: Option<i64>,
+    /// Until when the ring is open by an order of our own, or may seem to be.
+    pub(crate) opened_until: Instant,
 }
 
 impl DeviceTable {
@@ -128,7 +139,8 @@ impl DeviceTable {
         let devices = plan.devices.iter().map(live).collect();
         let times = Some(BringUpTimes::new(count));
         let stations = plan.devices.iter().map(|device| device.station).collect();
-        Self { devices, changed, times, stations, ..Self::default() }
+        let is_ring = plan.tree.closes_at().is_some();
+        Self { devices, changed, times, stations, is_ring, ..Self::default() }
     }
 
     /// Changes whenever presence or "settled" changes.
@@ -304,8 +316,10 @@ impl DeviceTable {
     pub(crate) fn clock(&self) -> ReferenceClock {
         let reference = self.reference.and_then(|(_, id)| self.devices.get(id?.index()));
         let stands = reference.is_none_or(DeviceEntry::shows_time);
-        let stand_in = if stands { None } else { self.stand_in() };
-        ReferenceClock { base: self.clock_base, stands, stand_in }
+        let of_ring = || self.reference.map(|(station, _)| station).filter(|_| self.is_ring);
+        let named = if stands { of_ring() } else { self.stand_in() };
+        let second_card_ns = self.second_card_ns;
+        ReferenceClock { base: self.clock_base, stands, named, second_card_ns }
     }
 
     /// Who gives the time while the reference does not: the first in the order of processing, so that most are
@@ -315,6 +329,18 @@ impl DeviceTable {
             || self.devices.iter().zip(&self.stations).filter(|(it, _)| it.shows_time());
         let wide = with_time().find(|(live, _)| live.clock_wide);
         wide.or_else(|| with_time().next()).map(|(_, station)| *station)
+    }
+
+    /// Those that have the time of all, in the order of processing.
+    pub(crate) fn with_time(&self) -> impl Iterator<Item = StationAddress> {
+        let all = self.devices.iter().zip(&self.stations);
+        all.filter(|(live, _)| live.shows_time()).map(|(_, station)| *station)
+    }
+
+    /// Notes what is added to the time in frames of the second card; `None`: they hand none round.
+    pub(crate) fn set_second_card_ns(&mut self, ns: Option<i64>) {
+        self.second_card_ns = ns;
+        self.version.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Whose clock all others follow.

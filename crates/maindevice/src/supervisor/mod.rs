@@ -14,6 +14,7 @@ pub(crate) mod device_table;
 mod locate;
 pub(crate) mod loop_control;
 mod modules;
+mod open_ring;
 mod rounds;
 mod shortest_cycle;
 mod start_up;
@@ -111,6 +112,9 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
     if clocks::wanted(&context.plan) {
         let setting = context.clone();
         context.wire.spawn(async move { clocks::set_all(&setting).await });
+        if context.plan.tree.closes_at().is_some() {
+            context.wire.spawn(open_ring::keep_in_step(context.clone()));
+        }
     } else {
         lock(&context.device_table).set_clocks_ready();
     }

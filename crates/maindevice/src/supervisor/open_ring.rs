@@ -1,0 +1,101 @@
+//! The clocks behind the place where a ring is open: what the time has to be that frames of the second card carry.
+//!
+//! The reference clock gives its time in the half that its card reaches. What the copy of the second card hands round
+//! comes to SubDevices by another way than the one whose delay they were told: along the ring the other way round, to
+//! the break and back. Within that half nothing has changed, for frames still pass the processing units in the same
+//! order; so one number is right for all of them. It is measured as delays are, by a broadcast write to 0x0900, at which
+//! every processing unit latches its clock (0x0918), while clocks still agree. Until it is there, which takes a few
+//! cycles, nobody there is given a time.
+
+use linesman_proto::address::{Path, StationAddress, WorkingCounter};
+use linesman_proto::register;
+use linesman_proto::time::Span;
+
+use super::Context;
+use crate::exchange::{ExchangeError, Request, Target};
+use crate::executor::lock;
+
+/// How often the ring is looked at.
+const LOOK: Span = Span::ms(1);
+/// When it is measured again what could not be measured.
+const AGAIN: Span = Span::ms(50);
+
+/// Keeps the clocks of both halves of an open ring in step, for as long as the network runs.
+pub(super) async fn keep_in_step(context: Context) {
+    let wire = &context.wire;
+    // Delays are measured with its end closed by order, for a moment.
+    let is_open = || {
+        wire.ring_intact() == Some(false) && wire.now() >= lock(&context.device_table).opened_until
+    };
+    loop {
+        while !is_open() {
+            wire.sleep(LOOK).await;
+        }
+        let responding = lock(&context.device_table).responding();
+        let measured_at = wire.now();
+        let measured = measure(&context).await.unwrap_or_default();
+        lock(&context.device_table).set_second_card_ns(measured);
+        let is_same = || {
+            // Another break, or one of two that is mended, leaves others behind it.
+            lock(&context.device_table).responding() == responding
+                && (measured.is_some() || wire.now().since(measured_at) < AGAIN)
+        };
+        while is_open() && is_same() {
+            wire.sleep(LOOK).await;
+        }
+        if !is_open() {
+            lock(&context.device_table).set_second_card_ns(None);
+        }
+    }
+}
+
+/// How much later, by their own clocks less their delays, SubDevices of the second card meet a frame than the
+/// reference does, in ns; 0 where the reference is one of them. `None` if the reference does not answer, or nobody
+/// there has a clock that was set.
+async fn measure(context: &Context) -> Result<Option<i64>, ExchangeError> {
+    let wire = &context.wire;
+    let (reference, others) = {
+        let device_table = lock(&context.device_table);
+        let Some(reference) = device_table.reference_clock() else { return Ok(None) };
+        (reference, device_table.with_time().collect::<Vec<_>>())
+    };
+    wire.ask(Request::write(Target::All, register::RECEIVE_TIME.address, &[0; 4])).await?;
+    let latched = |station: StationAddress, card: Path| {
+        let unit = register::RECEIVE_TIME_PROCESSING_UNIT;
+        wire.ask(Request::read(Target::Station(station), unit.address, unit.len).by_card(card))
+    };
+    let of_reference = latched(reference, Path::A);
+    let asked: Vec<_> =
+        others.into_iter().map(|station| (station, latched(station, Path::B))).collect();
+    let of_reference = of_reference.await?;
+    let mut behind = None;
+    for (station, reply) in asked {
+        let reply = reply.await?;
+        if reply.wkc == WorkingCounter(1) {
+            if station == reference {
+                return Ok(Some(0));
+            }
+            behind = behind.or(Some((station, reply)));
+        }
+    }
+    let Some((station, reply)) = behind.filter(|_| of_reference.wkc == WorkingCounter(1)) else {
+        return Ok(None);
+    };
+    let read = |station: StationAddress, register: &register::Register| {
+        wire.read(Target::Station(station), register.address, register.len)
+    };
+    let (offset, delay) = (&register::SYSTEM_TIME_OFFSET, &register::SYSTEM_TIME_DELAY);
+    let asked = [read(reference, offset), read(station, offset), read(station, delay)];
+    let [reference_offset, offset, delay] = asked;
+    let [reference_offset, offset, delay] = [reference_offset.await?, offset.await?, delay.await?];
+    if [&reference_offset, &offset, &delay].iter().any(|reply| reply.wkc != WorkingCounter(1)) {
+        return Ok(None);
+    }
+    let its = u64::from_le_bytes(reply.bytes(0))
+        .wrapping_add(u64::from_le_bytes(offset.bytes(0)))
+        .wrapping_sub(u32::from_le_bytes(delay.bytes(0)).into());
+    let of_reference = u64::from_le_bytes(of_reference.bytes(0))
+        .wrapping_add(u64::from_le_bytes(reference_offset.bytes(0)));
+    // Some clocks have the low half only.
+    Ok(Some((its.wrapping_sub(of_reference) as u32 as i32).into()))
+}
