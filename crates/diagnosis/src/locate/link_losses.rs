@@ -152,7 +152,7 @@ fn latest_spell(events: &mut [(Instant, Instant)], seen: &[LinkLoss]) -> Instant
         let mut long = seen.iter().filter(|drop| end.since(drop.at) >= LONG_LOSS);
         if long.any(|drop| drop.back == Some(end)) { CALM_AFTER_LONG } else { CALM }
     };
-    let mut spells = vec![Instant::ZERO];
+    let mut spells: Vec<Instant> = events.iter().take(1).map(|(from, _)| *from).collect();
     let mut ended: Option<Instant> = None;
     for &(from, to) in events.iter() {
         if ended.is_some_and(|ended| from > ended + calm_after(ended)) {
@@ -161,13 +161,14 @@ fn latest_spell(events: &mut [(Instant, Instant)], seen: &[LinkLoss]) -> Instant
         ended = ended.max(Some(to));
     }
     // What is mended again and again is not mended: it is one trouble.
-    let mut last = spells.len() - 1;
+    let mut last = spells.len().saturating_sub(1);
     if last >= 2 && spells[last].since(spells[last - 2]) <= OFTEN_WITHIN {
         while last > 0 && spells[last].since(spells[last - 1]) <= OFTEN_WITHIN {
             last -= 1;
         }
     }
-    spells[last]
+    // Counters may have risen before what is known of times.
+    if last == 0 { Instant::ZERO } else { spells[last] }
 }
 
 fn is_same(one: &LinkLoss, other: &LinkLoss) -> bool {
@@ -240,5 +241,29 @@ fn is_down(model: &NetworkModel, end: End) -> bool {
             status.is_some_and(|status| !status.value.port_state(port).link)
                 && !port_drops(model, end, node, port).is_empty()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn losses_that_are_mended_again_and_again_are_one_trouble() {
+        let end = End::Controller(0, Port::B);
+        let begin = |ms: u64| {
+            let at = Instant::from_nanos(ms * 1_000_000);
+            LinkLoss { end, at, frame: None, back: Some(at + Span::ms(300)) }
+        };
+        let latest = |begins: &[u64]| {
+            let seen: Vec<LinkLoss> = begins.iter().copied().map(begin).collect();
+            let mut events: Vec<_> =
+                seen.iter().map(|drop| (drop.at, drop.back.unwrap_or(Instant::MAX))).collect();
+            latest_spell(&mut events, &seen)
+        };
+        assert_eq!(latest(&[10_000, 11_200]), begin(11_200).at, "mended once");
+        assert_eq!(latest(&[10_000, 11_200, 12_400]), Instant::ZERO);
+        assert_eq!(latest(&[10_000, 30_000, 50_000]), begin(50_000).at, "far apart");
+        assert_eq!(latest(&[2_000, 20_000, 21_200, 22_400]), begin(20_000).at);
     }
 }
