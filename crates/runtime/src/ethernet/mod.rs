@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use linesman_config::plan::{DevicePlan, Plan};
+use linesman_config::plan::Plan;
 use linesman_link::socket::{Tap, WakeHandle, Waker};
 use linesman_maindevice::MainDevice;
 use linesman_maindevice::mailbox::MailboxRequest;
@@ -21,7 +21,6 @@ use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, Servi
 use linesman_maindevice::virtual_switch::SwitchLimits;
 use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::MailboxType;
-use linesman_proto::sii::Protocols;
 use linesman_proto::time::Instant;
 
 pub use self::report::{EthernetPortReport, EthernetReport};
@@ -167,9 +166,7 @@ impl VirtualEthernet {
     #[cold]
     fn begin(&mut self, plan: &Plan) {
         let ports: Vec<PlannedPort> = plan
-            .devices
-            .iter()
-            .filter(|device| has_port(device))
+            .ethernet_devices()
             .map(|device| PlannedPort { id: device.id, name: device.name.clone() })
             .collect();
         self.active = Some(!ports.is_empty());
@@ -221,13 +218,6 @@ impl Drop for VirtualEthernet {
         self.inputs = None;
         self.thread.wake();
     }
-}
-
-/// True for a SubDevice that speaks EoE, and whose frames are passed on (EOE-03).
-#[must_use]
-pub fn has_port(device: &DevicePlan) -> bool {
-    let speaks = device.mailbox.is_some_and(|mailbox| mailbox.protocols.has(Protocols::EOE));
-    speaks && device.settings.keeping.forward_ethernet
 }
 
 /// The two numbers that a frame gives: fragments, and repetitions.
