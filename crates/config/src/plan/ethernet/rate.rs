@@ -2,7 +2,8 @@
 //!
 //! The mailbox of a SubDevice takes one message and gives one in each cycle of the fastest task. A TCP segment of 1,460 bytes
 //! is a frame of 1,514, and that is as many messages as it has fragments. Where the wire has less time left than that
-//! takes, it is the free bandwidth that counts.
+//! takes, it is the free bandwidth that counts. To a SubDevice that takes messages quicker than the cycle it may be more: a mailbox that
+//! was full is tried again within the cycle.
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::frame::size::{frame_size, wire_time};
