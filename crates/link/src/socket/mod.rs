@@ -1,4 +1,4 @@
-//! Raw Ethernet sockets of Linux: one that exchanges EtherCAT frames, one that only listens; and [`Tap`], an interface
+//! Raw Ethernet sockets of Linux: one that exchanges EtherCAT frames, one that only listens; and [`TapInterface`], an interface
 //! whose frames this program has.
 //!
 //! Reference: packet(7). Both work in batches, on buffers that are laid out once: [`Batch`] holds
@@ -19,6 +19,6 @@ pub use batch::{Batch, ReceivedFrame, StampSource};
 pub use listener::{ListenFilter, Listener};
 pub use raw::{RawSocket, Reception, Sent, SocketOptions};
 pub use receiver::SocketCounters;
-pub use tap::{Tap, TapError};
+pub use tap::{TapError, TapInterface};
 pub use wait::{Ready, Waitable, wait_any, wait_for};
 pub use wake::{WakeHandle, Waker};

@@ -1,7 +1,7 @@
 //! TAP interfaces: network interfaces of this computer whose cable is this program.
 //!
 //! Reference: `Documentation/networking/tuntap.rst` of Linux; netdevice(7) for addresses. The interface is there as
-//! long as the [`Tap`]: the kernel removes it when the program ends, however it ends.
+//! long as the [`TapInterface`]: the kernel removes it when the program ends, however it ends.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Write as _};
@@ -80,12 +80,12 @@ pub enum TapError {
 
 /// A TAP interface. It is removed when this is dropped.
 #[derive(Debug)]
-pub struct Tap {
+pub struct TapInterface {
     name: String,
     file: File,
 }
 
-impl Tap {
+impl TapInterface {
     /// Makes the interface; it is down, and has no address.
     ///
     /// # Errors
@@ -204,13 +204,13 @@ fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted)
 }
 
-impl sealed::Pollable for Tap {
+impl sealed::Pollable for TapInterface {
     fn polled(&self) -> sealed::Polled<'_> {
         sealed::Polled::new(self.file.as_fd(), &self.name)
     }
 }
 
-impl Waitable for Tap {}
+impl Waitable for TapInterface {}
 
 /// What the kernel is told of an interface: `struct ifreq`.
 struct InterfaceRequest(libc::ifreq);
@@ -260,7 +260,7 @@ mod tests {
     #[test]
     fn names_that_no_interface_has_are_refused() {
         for name in ["", "a name", "a/b", "..", "0123456789abcdef", "ä"] {
-            let error = Tap::open(name).unwrap_err();
+            let error = TapInterface::open(name).unwrap_err();
             assert!(matches!(error, TapError::Name { .. }), "{name}: {error}");
         }
     }
