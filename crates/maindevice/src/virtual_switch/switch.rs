@@ -66,7 +66,7 @@ impl SwitchPort {
 }
 
 #[derive(Clone, Debug)]
-struct PortState {
+struct SwitchPortState {
     waiting: VecDeque<Arc<[u8]>>,
     flood: FloodLimit,
     counts: SwitchCounts,
@@ -76,7 +76,7 @@ struct PortState {
 #[derive(Clone, Debug)]
 pub struct VirtualSwitch {
     limits: SwitchLimits,
-    ports: Vec<PortState>,
+    ports: Vec<SwitchPortState>,
     table: MacTable,
 }
 
@@ -100,7 +100,8 @@ impl VirtualSwitch {
 
     fn push(&mut self) -> SwitchPort {
         let flood = FloodLimit::new(self.limits.flooded_per_second, Instant::ZERO);
-        let state = PortState { waiting: VecDeque::new(), flood, counts: SwitchCounts::default() };
+        let state =
+            SwitchPortState { waiting: VecDeque::new(), flood, counts: SwitchCounts::default() };
         self.ports.push(state);
         SwitchPort(self.ports.len() - 1)
     }

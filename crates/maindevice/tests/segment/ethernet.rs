@@ -95,21 +95,16 @@ impl Office {
             }
             self.bench.run_for(Span::ms(1));
             for (_, event) in std::mem::take(&mut self.bench.events) {
-                match event {
-                    Event::Mailbox { id, kind: MailboxType::Eoe, data } => {
-                        let Some((port, fragments)) = self.ports.get_mut(&id) else { continue };
-                        if let Some(frame) = fragments.handle_message(&data) {
-                            self.switch.handle_frame(self.bench.now, *port, frame);
-                        }
+                if let Event::Mailbox { id, kind: MailboxType::Eoe, data } = &event {
+                    let Some((port, fragments)) = self.ports.get_mut(id) else { continue };
+                    if let Some(frame) = fragments.handle_message(data) {
+                        self.switch.handle_frame(self.bench.now, *port, frame);
                     }
-                    Event::Served { result, .. } => {
-                        if let Ok(ServiceAnswer::Data(data)) = *result {
-                            let again = data.get(4..8).and_then(|bytes| bytes.try_into().ok());
-                            let again = again.map_or(0, u32::from_le_bytes);
-                            self.repetitions += u64::from(again);
-                        }
-                    }
-                    _ => {}
+                } else if let Event::Served { result, .. } = event
+                    && let Ok(ServiceAnswer::Data(data)) = *result
+                {
+                    let again = data.get(4..8).and_then(|bytes| bytes.try_into().ok());
+                    self.repetitions += u64::from(again.map_or(0, u32::from_le_bytes));
                 }
             }
             while let Some(frame) = self.switch.poll_transmit(SwitchPort::HOST) {
@@ -347,7 +342,7 @@ fn switch_terminal_lends_its_address_to_the_first_computer_at_its_ports() {
     office.came.clear();
     office.run(Span::s(40));
     // The second computer at the EL6614 still asks, and its question goes out into the network.
-    let asks = office.came.iter().filter(|frame| frame[36..38] == [0, 67]).last().cloned();
+    let asks = office.came.iter().rfind(|frame| frame[36..38] == [0, 67]).cloned();
     let asks = asks.expect("the second one asks on");
     assert!(office.ping(at_one, 10), "the one at the EL6601 has it");
     let mac = office.resolve(at_four).expect("one of two has it");
