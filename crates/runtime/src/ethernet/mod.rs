@@ -14,7 +14,7 @@ use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::plan::Plan;
-use linesman_link::socket::{Tap, WakeHandle, Waker};
+use linesman_link::socket::{TapInterface, WakeHandle, Waker};
 use linesman_maindevice::MainDevice;
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
@@ -64,7 +64,22 @@ struct SharedReport {
     missed: AtomicU64,
 }
 
+/// How often the counts are asked for before they are left out.
+const TRIES: usize = 10_000;
+
 impl SharedReport {
+    /// The same for the thread that runs the line, which must not wait for one without its priority.
+    fn try_get(&self) -> Option<EthernetReport> {
+        for _ in 0..TRIES {
+            if let Ok(report) = self.report.try_lock() {
+                let missed = self.missed.load(Ordering::Relaxed);
+                return Some(EthernetReport { missed, ..report.clone() });
+            }
+            std::hint::spin_loop();
+        }
+        None
+    }
+
     fn get(&self) -> EthernetReport {
         let report = self.report.lock().unwrap_or_else(PoisonError::into_inner).clone();
         EthernetReport { missed: self.missed.load(Ordering::Relaxed), ..report }
@@ -104,7 +119,7 @@ impl VirtualEthernet {
     /// # Errors
     /// When the system has no more threads or sockets.
     pub fn open(
-        tap: Option<Tap>,
+        tap: Option<TapInterface>,
         limits: SwitchLimits,
         wake_handle: WakeHandle,
     ) -> io::Result<Self> {
@@ -134,10 +149,11 @@ impl VirtualEthernet {
         self.watch.clone()
     }
 
-    /// What has gone through it; `None` where no SubDevice speaks EoE and no interface was wanted.
+    /// What has gone through it; `None` where no SubDevice speaks EoE and no interface was wanted, and, which is rare, where the
+    /// other thread is just counting: nobody waits for it here.
     #[must_use]
     pub fn report(&self) -> Option<EthernetReport> {
-        let report = self.watch.report();
+        let report = self.watch.0.try_get()?;
         (self.active == Some(true) || !report.is_idle()).then_some(report)
     }
 
@@ -146,6 +162,9 @@ impl VirtualEthernet {
         if self.active.is_none() {
             let Some(plan) = main.plan() else { return };
             self.begin(plan);
+        }
+        if self.active == Some(false) {
+            return;
         }
         while let Some((id, outcome)) = self.untold.pop() {
             if !self.try_tell(SwitchInput::Sent { id, outcome }) {

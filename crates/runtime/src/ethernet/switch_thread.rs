@@ -5,7 +5,7 @@ use std::sync::PoisonError;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError};
 use std::time::Instant as HostInstant;
 
-use linesman_link::socket::{Tap, Waitable, WakeHandle, Waker, wait_for};
+use linesman_link::socket::{TapInterface, Waitable, WakeHandle, Waker, wait_for};
 use linesman_maindevice::virtual_switch::{
     LONGEST_FRAME, SubDevicePort, SwitchLimits, SwitchPort, VirtualSwitch,
 };
@@ -37,7 +37,7 @@ struct ConnectedDevice {
 
 /// The thread, and what it has.
 pub(super) struct SwitchThread {
-    tap: Option<Tap>,
+    tap: Option<TapInterface>,
     switch: VirtualSwitch,
     devices: BTreeMap<DeviceId, ConnectedDevice>,
     without_port: Vec<String>,
@@ -52,7 +52,7 @@ pub(super) struct SwitchThread {
 
 impl SwitchThread {
     pub(super) fn new(
-        tap: Option<Tap>,
+        tap: Option<TapInterface>,
         limits: SwitchLimits,
         watch: EthernetWatch,
         frames: SyncSender<FrameToSend>,
