@@ -165,7 +165,7 @@ fn computer_in_another_subnet_reaches_a_device_by_the_routes_that_are_printed() 
 }
 
 // S0 L2985-3067.
-// proves: EOE-13
+// proves: EOE-13 partial: rules of a firewall are seen to be loaded, none was tried
 #[test]
 fn host_is_checked_for_what_ethernet_over_ethercat_needs() {
     let script = r#"

@@ -2,7 +2,7 @@
 
 use std::net::Ipv4Addr;
 
-use linesman_link::socket::{Tap, TapError, WakeHandle};
+use linesman_link::socket::{TapError, TapInterface, WakeHandle};
 use linesman_maindevice::virtual_switch::SwitchLimits;
 use linesman_runtime::ethernet::{EthernetReport, VirtualEthernet};
 
@@ -60,9 +60,9 @@ impl EthernetArguments {
         })
     }
 
-    fn tap(&self) -> Result<Option<Tap>, TapError> {
+    fn tap(&self) -> Result<Option<TapInterface>, TapError> {
         let Some(name) = &self.eoe else { return Ok(None) };
-        let tap = Tap::open(name)?;
+        let tap = TapInterface::open(name)?;
         if let Some((address, bits)) = self.eoe_address {
             tap.set_address(address, bits)?;
             tap.bring_up()?;
