@@ -86,9 +86,9 @@ impl SwitchThread {
             if !self.take(inputs) {
                 return;
             }
-            self.from_interface();
-            self.to_interface();
-            self.to_devices();
+            self.receive_from_interface();
+            self.send_to_interface();
+            self.hand_to_devices();
             self.publish();
             let sleeps = match (&self.tap, &self.failure) {
                 (Some(tap), None) => wait_for([waker as &dyn Waitable, tap], Some(LONGEST_SLEEP)),
@@ -153,7 +153,7 @@ impl SwitchThread {
         }
     }
 
-    fn from_interface(&mut self) {
+    fn receive_from_interface(&mut self) {
         let (Some(tap), None) = (&self.tap, &self.failure) else { return };
         let now = self.now();
         let mut buffer = [0; LONGEST_FRAME + 1];
@@ -176,7 +176,7 @@ impl SwitchThread {
         }
     }
 
-    fn to_interface(&mut self) {
+    fn send_to_interface(&mut self) {
         while let Some(frame) = self.switch.poll_transmit(SwitchPort::HOST) {
             let taken = match (&self.tap, &self.failure) {
                 (Some(tap), None) => tap.send(&frame),
@@ -188,7 +188,7 @@ impl SwitchThread {
     }
 
     /// Hands frames to the MainDevice, not many of each SubDevice at once: those of the port wait here.
-    fn to_devices(&mut self) {
+    fn hand_to_devices(&mut self) {
         let mut any = false;
         for (id, device) in &mut self.devices {
             while device.under_way < AT_ONCE
