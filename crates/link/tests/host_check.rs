@@ -6,7 +6,7 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
-use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect};
+use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect, inspect_network};
 use tempfile::TempDir;
 
 /// What is well: a computer for machines.
@@ -271,4 +271,57 @@ fn an_empty_folder_is_unknown_and_not_good() {
     {
         assert_eq!(one(&checks, name).outcome, Outcome::Unknown, "{name}");
     }
+}
+
+/// What is well for Ethernet over EtherCAT.
+const NETWORK: [(&str, &str); 7] = [
+    ("proc/self/status", "CapEff:\t0000000000001000\n"),
+    ("proc/misc", "200 tun\n237 loop-control\n"),
+    ("proc/modules", "nf_tables 200000 0 - Live 0x0\n"),
+    ("proc/sys/net/ipv4/ip_forward", "1\n"),
+    ("proc/sys/net/ipv4/icmp_echo_ignore_all", "0\n"),
+    ("proc/sys/net/ipv4/conf/all/rp_filter", "0\n"),
+    (
+        "proc/net/route",
+        "Iface\tDestination\tGateway\tFlags\tRefCnt\tUse\tMetric\tMask\tMTU\tWindow\tIRTT\n\
+         eth0\t00000000\tCD0410AC\t0003\t0\t0\t0\t00000000\t0\t0\t0\n\
+         eoe0\t0001A8C0\t00000000\t0001\t0\t0\t0\t00FFFFFF\t0\t0\t0\n",
+    ),
+];
+
+#[test]
+fn network_settings_are_checked_one_by_one() {
+    let judged = |change: Option<(&str, &str)>, interface: &str| {
+        let folder = TempDir::new().unwrap();
+        for (path, text) in NETWORK {
+            write(folder.path(), path, text);
+        }
+        if let Some((path, text)) = change {
+            write(folder.path(), path, text);
+        }
+        inspect_network(&Files::below(folder.path()), Some(interface))
+    };
+    let well = judged(None, "eoe0");
+    assert!(well.iter().all(|check| check.outcome == Outcome::Good), "{well:#?}");
+    let routes = well.iter().find(|check| check.name == "routes").unwrap();
+    assert_eq!(routes.found, "0.0.0.0/0 via 172.16.4.205 dev eth0, 192.168.1.0/24 dev eoe0");
+    for (name, path, text) in [
+        ("interface-rights", "proc/self/status", "CapEff:\t0000000000002000\n"),
+        ("tap-interfaces", "proc/misc", "237 loop-control\n"),
+        ("firewall", "proc/modules", "nf_tables 200000 12 - Live 0x0\n"),
+        ("firewall", "proc/net/ip_tables_names", "filter\n"),
+        ("forwarding", "proc/sys/net/ipv4/ip_forward", "0\n"),
+        ("ping-answers", "proc/sys/net/ipv4/icmp_echo_ignore_all", "1\n"),
+        ("reverse-path", "proc/sys/net/ipv4/conf/eoe0/rp_filter", "1\n"),
+    ] {
+        let checks = judged(Some((path, text)), "eoe0");
+        let bad: Vec<_> =
+            checks.iter().filter(|check| check.outcome == Outcome::Doubtful).collect();
+        assert_eq!(bad.len(), 1, "{name}: {checks:#?}");
+        assert_eq!(bad[0].name, name);
+        assert!(!bad[0].mend.is_empty() && !bad[0].effect.is_empty(), "{name}");
+    }
+    let elsewhere = judged(None, "eoe7");
+    let routes = elsewhere.iter().find(|check| check.name == "routes").unwrap();
+    assert_eq!(routes.outcome, Outcome::Doubtful, "{routes:?}");
 }

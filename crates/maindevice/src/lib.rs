@@ -5,7 +5,7 @@
 //! datagrams and matches what comes back; [`executor`] runs procedures ([`procedure`]) that await
 //! answers; `cyclic` exchanges process data; `supervisor` brings each SubDevice to its target and
 //! keeps it there; [`mailbox`] talks to the software of SubDevices; [`service`] does single things
-//! for tools.
+//! for tools; [`virtual_switch`] passes Ethernet frames between SubDevices and this computer.
 //!
 //! Read first: "Shapes" in `ARCHITECTURE.md`.
 
@@ -20,6 +20,7 @@ pub mod procedure;
 pub mod service;
 pub mod statistics;
 mod supervisor;
+pub mod virtual_switch;
 pub mod watch;
 
 pub use cyclic::{FrameStatus, Quality};

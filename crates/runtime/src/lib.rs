@@ -6,7 +6,7 @@
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`truth_writer`] writes down what really happened, [`names`] says where. [`plan_file`] reads
 //! the file that a line is planned with, [`named_files`] the files that a file names. [`gateway`] passes mailbox messages
-//! of other programs to a line that runs. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop,
+//! of other programs to a line that runs, [`ethernet`] frames between its SubDevices and an interface of this computer. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop,
 //! [`part`] says that a part of a command has failed.
 
 pub mod bundle;
@@ -14,6 +14,7 @@ pub mod capture;
 pub mod control;
 mod control_socket;
 pub mod drive;
+pub mod ethernet;
 #[cfg(feature = "event-log")]
 pub mod event_log;
 pub mod gateway;

@@ -57,7 +57,8 @@ fn driven<L: Transport<Error = LinkError>>(
         diagnose: Some(Setup::default()),
     };
     let (notes, told) = sync_channel(NOTES);
-    let beside = RunControls { stop: &Stop::default(), notes, socket: None, gateway: None };
+    let beside =
+        RunControls { stop: &Stop::default(), notes, socket: None, gateway: None, ethernet: None };
     let wanted = PlanChoices::default().as_found();
     (run_observed(line, wanted, application, &options, beside, observer), told)
 }

@@ -6,7 +6,7 @@ mod jitter;
 
 use std::path::PathBuf;
 
-use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect};
+use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect, inspect_network};
 use linesman_link::interface::{self, InterfaceKind};
 use linesman_proto::time::Span;
 use serde::Serialize;
@@ -36,6 +36,10 @@ pub(crate) struct Arguments {
         value_parser = duration(MICROSECOND, Span::us(50), Span::s(1))
     )]
     cycle_us: Span,
+    /// What Ethernet over EtherCAT needs, too: rights, forwarding, routes, firewall; with the interface of `run --eoe`, if it is
+    /// there
+    #[arg(long, value_name = "INTERFACE", num_args = 0..=1, default_missing_value = "")]
+    eoe: Option<String>,
     /// Judge the files below this folder, a copy of another computer's /sys and /proc
     #[arg(long, value_name = "FOLDER", conflicts_with = "measure")]
     root: Option<PathBuf>,
@@ -67,7 +71,7 @@ pub(crate) struct Report {
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct CheckReport {
-    /// `rights`, `machine`, `kernel`, `processor` or `card`.
+    /// `rights`, `machine`, `kernel`, `processor`, `card` or `network`.
     area: String,
     /// Its name.
     name: String,
@@ -94,7 +98,13 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         None => Files::own(),
     };
     let cards = cards(arguments)?;
-    let checks = inspect(&files, &cards);
+    let mut checks = inspect(&files, &cards);
+    if let Some(interface) = &arguments.eoe {
+        checks.extend(inspect_network(
+            &files,
+            Some(interface.as_str()).filter(|name| !name.is_empty()),
+        ));
+    }
     let jitter = arguments.measure.map(|lasts| jitter::measure(arguments.cycle_us, lasts));
     let worst = checks.iter().map(|check| check.outcome).max();
     let late = jitter.as_ref().is_some_and(|jitter| !jitter.is_good());

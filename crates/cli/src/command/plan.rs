@@ -1,6 +1,7 @@
 //! `linesman plan`: what follows from a project or network configuration, before anything is switched
 //! on: frame table, load, E-bus budget, clock shifts, doubts.
 
+mod ethernet;
 pub(crate) mod report;
 mod segment;
 mod table;
@@ -48,6 +49,8 @@ pub(crate) struct Arguments {
     segment: Option<PathBuf>,
     #[command(flatten)]
     timing: timing::TimingArguments,
+    #[command(flatten)]
+    ethernet: ethernet::EthernetPlanArguments,
     /// JSON, schema linesman.plan/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -66,14 +69,25 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         return Err(Failure::new(reason, "leave out `--save`, or name an ENI (XML)"));
     }
     let file = PlanFile::open_with(&arguments.file, arguments.cycle_us)?;
-    let doubts = file.plan.doubts();
+    let mut doubts = file.plan.doubts();
+    let ethernet = match arguments.ethernet.ethernet {
+        true => Some(arguments.ethernet.report(&file.plan)?),
+        false => None,
+    };
+    if ethernet.is_some() {
+        doubts.extend(arguments.ethernet.doubts(&file.plan));
+        doubts.sort_by_key(|doubt| std::cmp::Reverse(doubt.severity));
+    }
     let options = arguments.timing.options(&file.plan)?;
     let timing = arguments.timing.timing.then(|| file.plan.timing(&options));
     let plot = timing.as_ref().map(|timing| CyclePlot::new(&file.plan, timing, &options));
     if arguments.json {
-        output.json(&report::report(&file, &doubts, timing.as_ref()));
+        output.json(&report::report(&file, &doubts, timing.as_ref(), ethernet));
     } else {
         output.text(&table::text(&file, &doubts, arguments.verbose, output));
+        if let Some(ethernet) = &ethernet {
+            output.text(&ethernet::text(ethernet, output));
+        }
     }
     if let (Some(timing), Some(plot)) = (&timing, &plot) {
         if !arguments.json {

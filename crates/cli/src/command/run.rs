@@ -1,5 +1,6 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
+pub(super) mod ethernet;
 mod gateway;
 mod reporter;
 
@@ -20,6 +21,7 @@ use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_runtime::bundle::{BundleReceiver, BundleRecorder, RecordedEngine};
+use linesman_runtime::ethernet::VirtualEthernet;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
 use linesman_runtime::gateway::MailboxGateway;
 use linesman_runtime::online::OnlineState;
@@ -35,6 +37,7 @@ use linesman_runtime::stop::Stop;
 use linesman_runtime::system_log::SystemLog;
 use linesman_runtime::transport::{Cards, Pace, Transport};
 
+use self::ethernet::EthernetArguments;
 use self::gateway::GatewayArguments;
 use self::reporter::{Logs, RunReporter};
 use super::bundle::recording::{self, BundleArguments};
@@ -122,6 +125,8 @@ pub(crate) struct Arguments {
     control: Option<PathBuf>,
     #[command(flatten)]
     gateway: GatewayArguments,
+    #[command(flatten)]
+    ethernet: EthernetArguments,
     #[command(flatten)]
     bundles: BundleArguments,
     /// Do not judge the line meanwhile
@@ -240,6 +245,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             line.set_spin(arguments.spin_us);
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
             let gateway = arguments.gateway.open(line.wake_handle(), online.clone())?;
+            let ethernet = arguments.ethernet.open(line.wake_handle())?;
+            online.set_ethernet(ethernet.watch());
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
             let real_time = Some(RealTime {
                 priority: (arguments.priority > 0).then_some(arguments.priority),
@@ -248,15 +255,19 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             });
             let options = with_source(options, real_time, began.rfc3339());
             let bundles = arguments.bundles.start(began, names)?;
-            let beside = (socket, gateway, bundles);
+            let beside = (socket, gateway, ethernet, bundles);
             drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
         }
         Selector::Segment(path) => {
-            // Without an end it goes no faster than the host's clock, for a person to look on.
-            let pace = if lasts.is_some() { Pace::Free } else { Pace::Host };
+            // Without an end it goes no faster than the host's clock, for a person to look on; so it does for the IP stack of
+            // this computer.
+            let free = lasts.is_some() && !arguments.ethernet.wants_interface();
+            let pace = if free { Pace::Free } else { Pace::Host };
             let line = line_access::virtual_line(path, pace)?;
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
             let gateway = arguments.gateway.open(line.wake_handle(), online.clone())?;
+            let ethernet = arguments.ethernet.open(line.wake_handle())?;
+            online.set_ethernet(ethernet.watch());
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
             let mut options = options;
             if let Some(setup) = &mut options.diagnose {
@@ -264,7 +275,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             }
             // A virtual run has no date.
             let bundles = arguments.bundles.start(UnixTime::EPOCH, &[])?;
-            let beside = (socket, gateway, bundles);
+            let beside = (socket, gateway, ethernet, bundles);
             drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
         }
         Selector::Listen(_) | Selector::File(_) => {
@@ -342,8 +353,12 @@ fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn Diagnosis
 }
 
 /// What runs beside the line.
-type RunCompanions =
-    (Option<ServiceSocket>, Option<MailboxGateway>, Option<(BundleRecorder, BundleReceiver)>);
+type RunCompanions = (
+    Option<ServiceSocket>,
+    Option<MailboxGateway>,
+    VirtualEthernet,
+    Option<(BundleRecorder, BundleReceiver)>,
+);
 
 /// Runs the line in a thread of its own, and tells what happens meanwhile.
 #[allow(clippy::too_many_arguments, reason = "called twice, from above")]
@@ -352,7 +367,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     wanted: PlanSource,
     options: &SessionOptions,
     image: Option<PathBuf>,
-    (socket, gateway, bundles): RunCompanions,
+    (socket, gateway, ethernet, bundles): RunCompanions,
     stop: &Stop,
     said: &str,
     mut reporter: RunReporter,
@@ -361,6 +376,9 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     reporter.line(said, output);
     if let Some(gateway) = &gateway {
         reporter.line(&gateway::opened(gateway), output);
+    }
+    if let Some(text) = ethernet::opened(&ethernet) {
+        reporter.line(&text, output);
     }
     let (notes, told) = mpsc::sync_channel(NOTES);
     let socket_watch = socket.as_ref().map(ServiceSocket::watch);
@@ -375,7 +393,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
         }
     };
     let ended = std::thread::scope(|scope| {
-        let beside = RunControls { stop, notes, socket, gateway };
+        let beside = RunControls { stop, notes, socket, gateway, ethernet: Some(ethernet) };
         let judge = move |setup| observer(setup, recorder);
         let work = move || match image {
             None => running::run_observed(line, wanted, Idle, options, beside, judge),

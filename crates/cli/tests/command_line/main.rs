@@ -30,6 +30,7 @@ mod device_table;
 mod drawings;
 mod ending;
 mod eni_project;
+mod ethernet;
 mod event_words;
 mod exchange;
 mod failing_parts;

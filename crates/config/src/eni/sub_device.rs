@@ -347,6 +347,7 @@ fn ours(own: &Element, file: &mut FileDevice) -> Result<(), EsiError> {
         restore_state: unless_said("restore-state")?,
         reinitialise: unless_said("reinitialise")?,
         clear_counters: unless_said("clear-counters")?,
+        forward_ethernet: unless_said("forward-ethernet")?,
     };
     device.settings.task = own.attribute("task").map(str::to_owned);
     device.settings.sync_unit = own.attribute("sync-unit").map(str::to_owned);

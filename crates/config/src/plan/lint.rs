@@ -92,6 +92,7 @@ impl Plan {
             self.watchdog(device, &mut doubts);
             self.clock(device, &mut doubts);
         }
+        self.ethernet_addresses(&mut doubts);
         self.reference(&mut doubts);
         self.units(&mut doubts);
         doubts.sort_by_key(|doubt| std::cmp::Reverse(doubt.severity));

@@ -7,6 +7,7 @@
 //! is never a number here but a function: see [`expect`].
 
 mod cycle;
+pub mod ethernet;
 mod exchange;
 pub mod expect;
 pub mod layout;

@@ -44,11 +44,18 @@ pub struct AutomaticActions {
     pub reinitialise: bool,
     /// Its error counters are cleared before they stop at 255; else they are only read, as where another tool clears them.
     pub clear_counters: bool,
+    /// Its Ethernet frames are passed on by the virtual switch, where it speaks EoE (EOE-03).
+    pub forward_ethernet: bool,
 }
 
 impl Default for AutomaticActions {
     fn default() -> Self {
-        Self { restore_state: true, reinitialise: true, clear_counters: true }
+        Self {
+            restore_state: true,
+            reinitialise: true,
+            clear_counters: true,
+            forward_ethernet: true,
+        }
     }
 }
 

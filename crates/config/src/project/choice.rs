@@ -35,6 +35,9 @@ pub struct Network {
     pub reinitialise: bool,
     /// Error counters are cleared before they stop at 255, unless a SubDevice says otherwise; else they are only read.
     pub clear_counters: bool,
+    /// Ethernet frames of SubDevices that speak EoE are passed on by the virtual switch of a run, unless a SubDevice says
+    /// otherwise.
+    pub eoe: bool,
     /// From the frames to SYNC0, in µs; 30 % of the cycle unless said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outputs_shift_us: Option<u32>,
@@ -64,6 +67,7 @@ impl Default for Network {
             restore_state: true,
             reinitialise: true,
             clear_counters: true,
+            eoe: true,
             outputs_shift_us: None,
             inputs_shift_us: None,
             sync_window_ns: None,

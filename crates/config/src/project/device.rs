@@ -90,6 +90,10 @@ pub struct ProjectDevice {
     /// Its error counters are cleared before they stop at 255; as in the network unless said.
     #[serde(default)]
     pub clear_counters: Option<bool>,
+    /// Its Ethernet frames are passed on by the virtual switch of a run, where it speaks EoE; as in the network unless
+    /// said.
+    #[serde(default)]
+    pub eoe: Option<bool>,
     /// Its watchdogs.
     #[serde(default)]
     pub watchdog: WatchdogChoice,
@@ -147,6 +151,7 @@ impl ProjectDevice {
             restore_state: None,
             reinitialise: None,
             clear_counters: None,
+            eoe: None,
             watchdog: WatchdogChoice::default(),
             clock: None,
             sync_times: SyncTimes::default(),
@@ -249,6 +254,7 @@ impl ProjectDevice {
         choice("restore_state", self.restore_state.as_ref().map(inline));
         choice("reinitialise", self.reinitialise.as_ref().map(inline));
         choice("clear_counters", self.clear_counters.as_ref().map(inline));
+        choice("eoe", self.eoe.as_ref().map(inline));
         let watchdog = &self.watchdog;
         choice("watchdog", (*watchdog != WatchdogChoice::default()).then(|| inline(watchdog)));
         choice("clock", self.clock.as_ref().map(inline));

@@ -181,6 +181,7 @@ impl Project {
                 restore_state: device.restore_state.unwrap_or(self.network.restore_state),
                 reinitialise: device.reinitialise.unwrap_or(self.network.reinitialise),
                 clear_counters: device.clear_counters.unwrap_or(self.network.clear_counters),
+                forward_ethernet: device.eoe.unwrap_or(self.network.eoe),
             },
             modules,
         };

@@ -12,6 +12,7 @@ mod card;
 mod files;
 mod kernel;
 mod machine;
+mod network;
 mod privilege;
 mod processor;
 
@@ -33,6 +34,8 @@ pub enum Area {
     Processor,
     /// The network card.
     Card,
+    /// Network settings that Ethernet over EtherCAT needs.
+    Network,
 }
 
 impl fmt::Display for Area {
@@ -43,6 +46,7 @@ impl fmt::Display for Area {
             Self::Kernel => "kernel",
             Self::Processor => "processor",
             Self::Card => "card",
+            Self::Network => "network",
         })
     }
 }
@@ -124,4 +128,11 @@ pub fn inspect(files: &Files, cards: &[(String, DriverSettings)]) -> Vec<Check> 
         checks.extend(card::checks(files, name, settings));
     }
     checks
+}
+
+/// Checks of the network settings that Ethernet over EtherCAT needs (EOE-13); `interface` is the one of `run --eoe`, if there is
+/// one to look at.
+#[must_use]
+pub fn inspect_network(files: &Files, interface: Option<&str>) -> Vec<Check> {
+    network::checks(files, interface)
 }

@@ -3,10 +3,11 @@
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
 //! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information`,
 //! `foe`, `settings` and `pass` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
-//! another. Emergencies and messages that nobody asked for become events; what went wrong is kept
+//! another; `ethernet` sends frames for the virtual switch. Emergencies and messages that nobody asked for become events; what went wrong is kept
 //! ([`ProtocolErrors`]).
 
 mod coe;
+mod ethernet;
 mod failure;
 mod foe;
 mod information;
@@ -36,6 +37,11 @@ pub(crate) use queue::{MailboxJob, MailboxQueues, Outcome};
 
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long.
 const UNHEARD: Span = Span::s(1);
+
+/// So long after an Ethernet frame a mailbox is looked into often: frames seldom come alone.
+const FRAMES_EXPECTED: Span = Span::ms(200);
+/// So often, then.
+const FRAME_INTERVAL: Span = Span::ms(1);
 
 /// So long after a message of a transfer a SubDevice is kept for the client of the mailbox gateway whose transfer it
 /// is.
@@ -82,6 +88,11 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
             false => context.options.mailbox_interval,
         };
         let interval = kept_for.map_or(interval, |kept| interval.min(kept.until.since(now)));
+        let expects_frames = multiplexer.last_frame().is_some_and(|at| now < at + FRAMES_EXPECTED);
+        let interval = match expects_frames && !mailboxes.is_mapped(id) {
+            true => interval.min(FRAME_INTERVAL),
+            false => interval,
+        };
         let client = kept_for.map(|kept| kept.client);
         let job = mailboxes.next(id, client, context.wire.sleep(interval)).await;
         let (open, boots, now) = {
@@ -100,8 +111,11 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
         let open = open && multiplexer.set_boots(boots);
         match job {
             Some(job) => {
-                let client = job.request.client();
+                let (client, is_frame) = (job.request.client(), job.request.is_frame());
                 work(&context, &mut multiplexer, job, open).await;
+                if is_frame {
+                    continue;
+                }
                 let (under_way, now) = (multiplexer.is_passing(), context.wire.now());
                 kept_for = KeptFor::after(kept_for, client, under_way, now);
             }
@@ -121,8 +135,8 @@ async fn work(context: &Context, multiplexer: &mut Multiplexer, job: MailboxJob,
         let (id, operation) = (job.id, job.request.operation());
         Err(MailboxFailure { id, operation, step: Step::Before, why: Why::NotOpen })
     };
-    // What others ask for in vain is no trouble of the SubDevice.
-    if job.request.client().is_none() {
+    // What others ask for in vain is no trouble of the SubDevice, nor are frames that nobody can take now.
+    if job.request.client().is_none() && (open || !job.request.is_frame()) {
         context.mailboxes.note(job.id, context.wire.now(), &job.request, &outcome);
     }
     job.done(outcome);

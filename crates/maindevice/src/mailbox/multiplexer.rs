@@ -56,6 +56,10 @@ pub(crate) struct Multiplexer {
     rubbish: Option<(u32, String)>,
     /// The transfer of a client of the mailbox gateway.
     pub(super) passed: PassedTransfer,
+    /// How often a message was sent or fetched again after a frame was lost.
+    repetitions: u32,
+    /// When a fragment of an Ethernet frame was sent or came.
+    last_frame: Option<Instant>,
 }
 
 impl Multiplexer {
@@ -77,6 +81,8 @@ impl Multiplexer {
             late: false,
             rubbish: None,
             passed: PassedTransfer::default(),
+            repetitions: 0,
+            last_frame: None,
         })
     }
 
@@ -98,6 +104,16 @@ impl Multiplexer {
     /// True if a transfer of a client of the mailbox gateway is under way.
     pub(crate) fn is_passing(&self) -> bool {
         self.passed.under_way
+    }
+
+    /// How often a message was sent or fetched again after a frame was lost; it wraps.
+    pub(crate) fn repetitions(&self) -> u32 {
+        self.repetitions
+    }
+
+    /// When a fragment of an Ethernet frame was sent or came; `None`: never.
+    pub(crate) fn last_frame(&self) -> Option<Instant> {
+        self.last_frame
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -188,6 +204,10 @@ impl Multiplexer {
         self.sent = Some(counter);
         let mut pause = FIRST_POLL;
         let mut uncertain = false;
+        let is_frame = kind == MailboxType::Eoe;
+        if is_frame {
+            self.last_frame = Some(self.wire.now());
+        }
         loop {
             let request = Request::write(self.target, self.areas.receive.offset, &buffer);
             match self.wire.submit(request).await {
@@ -204,7 +224,14 @@ impl Multiplexer {
                     }
                 }
                 Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error.into()),
-                Err(ExchangeError::NoReply { .. }) => uncertain = true,
+                Err(ExchangeError::NoReply { .. }) => {
+                    uncertain = true;
+                    self.repetitions = self.repetitions.wrapping_add(1);
+                }
+            }
+            if is_frame {
+                // Frames go both ways at once: it may wait for room for its own.
+                self.drain().await;
             }
             if self.wire.now() >= until {
                 return Ok(false);
@@ -289,6 +316,7 @@ impl Multiplexer {
                 // mailbox, the SubDevice is asked to put it in again.
                 Err(ExchangeError::NoReply { .. }) => {
                     if !self.is_full(IN).await? {
+                        self.repetitions = self.repetitions.wrapping_add(1);
                         self.fetched_again = true;
                         self.ask_for_repetition().await?;
                     }
@@ -356,10 +384,12 @@ impl Multiplexer {
                 return Ok(Some(message.data.to_vec()));
             }
             // Frames and time stamps come unasked at any time.
-            MailboxType::Eoe if wanted == Some(kind) => {
-                if let Ok(eoe::Message::Response { .. }) = eoe::Message::parse(message.data) {
+            MailboxType::Eoe => {
+                let answer = eoe::Message::parse(message.data);
+                if wanted == Some(kind) && matches!(answer, Ok(eoe::Message::Response { .. })) {
                     return Ok(Some(message.data.to_vec()));
                 }
+                self.last_frame = Some(self.wire.now());
             }
             MailboxType::Soe if wanted == Some(kind) => {
                 let operation = soe::Message::parse(message.data).map(|answer| answer.operation);
@@ -373,11 +403,7 @@ impl Multiplexer {
             MailboxType::Reserved(code) => {
                 self.found_rubbish(format!("a message of the reserved type {code}"));
             }
-            MailboxType::Aoe
-            | MailboxType::Eoe
-            | MailboxType::Foe
-            | MailboxType::Soe
-            | MailboxType::Voe => {}
+            MailboxType::Aoe | MailboxType::Foe | MailboxType::Soe | MailboxType::Voe => {}
         }
         self.unasked(kind, message.data.to_vec());
         Ok(None)

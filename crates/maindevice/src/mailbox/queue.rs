@@ -98,11 +98,15 @@ struct MailboxQueue {
 }
 
 impl MailboxQueue {
-    /// The next job; with a client, its next one.
+    /// The next job; with a client, its next one or an Ethernet frame.
     fn take(&mut self, kept_for: Option<u64>) -> Option<MailboxJob> {
         let at = match kept_for {
             None => 0,
-            Some(_) => self.jobs.iter().position(|job| job.request.client() == kept_for)?,
+            Some(_) => {
+                let mine =
+                    |job: &MailboxJob| job.request.client() == kept_for || job.request.is_frame();
+                self.jobs.iter().position(mine)?
+            }
         };
         self.jobs.remove(at)
     }

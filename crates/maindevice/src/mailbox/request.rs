@@ -53,6 +53,16 @@ pub enum MailboxRequest {
         /// The addresses as the message carries them.
         parameters: Vec<u8>,
     },
+    /// Send an Ethernet frame by EoE, in as many fragments as it takes: two numbers of four bytes, lowest byte
+    /// first, how many fragments that were, and how often messages were sent or fetched again for it.
+    SendFrame {
+        /// Which port of the SubDevice, 0 to 15.
+        port: u8,
+        /// Number of the frame, 0 to 15.
+        number: u8,
+        /// The frame without check sequence, 14 to 1,518 bytes.
+        frame: Vec<u8>,
+    },
     /// Write an identification number by SoE: nothing comes back.
     WriteIdn {
         /// Which drive of the SubDevice.
@@ -104,10 +114,17 @@ impl MailboxRequest {
             | Self::DescribeObject { .. }
             | Self::DescribeEntry { .. }
             | Self::SetAddresses { .. }
+            | Self::SendFrame { .. }
             | Self::WriteIdn { .. }
             | Self::ReadFile { .. }
             | Self::WriteFile { .. } => None,
         }
+    }
+
+    /// True for an Ethernet frame. It is part of no transfer, and disturbs none.
+    #[must_use]
+    pub(crate) const fn is_frame(&self) -> bool {
+        matches!(self, Self::SendFrame { .. })
     }
 
     /// What is to be done, without data and password.
@@ -126,6 +143,7 @@ impl MailboxRequest {
                 MailboxOperation::DescribeEntry { object: *object }
             }
             Self::SetAddresses { port, .. } => MailboxOperation::SetAddresses { port: *port },
+            Self::SendFrame { frame, .. } => MailboxOperation::SendFrame { len: frame.len() },
             Self::WriteIdn { drive, idn, .. } => {
                 MailboxOperation::WriteIdn { drive: *drive, idn: *idn }
             }
@@ -173,6 +191,11 @@ pub enum MailboxOperation {
         /// Which port.
         port: u8,
     },
+    /// Sending an Ethernet frame.
+    SendFrame {
+        /// How many bytes it has.
+        len: usize,
+    },
     /// Writing an identification number of a drive.
     WriteIdn {
         /// Which drive.
@@ -207,7 +230,7 @@ impl MailboxOperation {
             | Self::List { .. }
             | Self::DescribeObject { .. }
             | Self::DescribeEntry { .. } => MailboxType::Coe,
-            Self::SetAddresses { .. } => MailboxType::Eoe,
+            Self::SetAddresses { .. } | Self::SendFrame { .. } => MailboxType::Eoe,
             Self::WriteIdn { .. } => MailboxType::Soe,
             Self::ReadFile { .. } | Self::WriteFile { .. } => MailboxType::Foe,
             Self::Pass { protocol } => *protocol,
@@ -231,6 +254,7 @@ impl fmt::Display for MailboxOperation {
             Self::SetAddresses { port } => {
                 write!(f, "setting the addresses of Ethernet port {port}")
             }
+            Self::SendFrame { len } => write!(f, "sending an Ethernet frame of {len} bytes"),
             Self::WriteIdn { drive, idn } => write!(f, "writing {idn} of drive {drive}"),
             Self::ReadFile { name } => write!(f, "reading file `{name}`"),
             Self::WriteFile { name } => write!(f, "writing file `{name}`"),

@@ -6,7 +6,7 @@ use linesman_proto::time::{Instant, Span};
 use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
 use super::request::MailboxRequest;
-use super::{coe, foe, information, pass, settings};
+use super::{coe, ethernet, foe, information, pass, settings};
 
 /// A SubDevice that writes what it got into its flash memory answers late: a file takes more patience
 /// than an object.
@@ -73,6 +73,9 @@ impl MailboxTransaction<'_> {
             }
             MailboxRequest::SetAddresses { port, parameters } => {
                 settings::set_addresses(self, *port, parameters).await.map(|()| Vec::new())
+            }
+            MailboxRequest::SendFrame { port, number, frame } => {
+                ethernet::send_frame(self, *port, *number, frame).await
             }
             MailboxRequest::WriteIdn { drive, idn, elements, data } => {
                 let written = settings::write_idn(self, *drive, *elements, idn.0, data).await;

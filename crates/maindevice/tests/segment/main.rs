@@ -7,6 +7,7 @@ mod al_errors;
 mod bench;
 mod clocks;
 mod described;
+mod ethernet;
 mod library;
 mod loop_control;
 mod mailbox;

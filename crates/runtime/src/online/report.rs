@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::ethernet::EthernetReport;
+
 /// Name and version of the format.
 pub const SCHEMA: &str = "linesman.online/1";
 
@@ -44,6 +46,9 @@ pub struct OnlineReport {
     pub odd: OddFrames,
     /// The network cards, that of path A first.
     pub cards: Vec<Card>,
+    /// What goes through the virtual switch (EoE); `null`: no SubDevice has a port of it, and there is no interface.
+    #[serde(default)]
+    pub ethernet: Option<EthernetReport>,
 }
 
 /// The time of the network: that of the reference clock.

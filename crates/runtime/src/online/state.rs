@@ -12,6 +12,7 @@ use linesman_proto::time::{Instant, Span};
 use super::build;
 use super::report::{Card, OnlineReport};
 use super::snapshot::Snapshot;
+use crate::ethernet::EthernetWatch;
 
 /// So long after the last frame that a card did not take it counts as taking them again.
 const FORGIVEN_AFTER: Span = Span::s(1);
@@ -31,6 +32,8 @@ struct OnlineShared {
     failed_at: Option<Instant>,
     /// Where the counts of frames began when they were cleared last.
     base: Statistics,
+    /// Counts of the virtual switch beside the run.
+    ethernet: Option<EthernetWatch>,
 }
 
 impl OnlineState {
@@ -49,6 +52,11 @@ impl OnlineState {
     /// This plan is run from now on.
     pub fn begin(&self, plan: Arc<Plan>) {
         self.lock().watch = Some(Watch::new(plan));
+    }
+
+    /// A virtual switch passes frames of SubDevices on.
+    pub fn set_ethernet(&self, watch: EthernetWatch) {
+        self.lock().ethernet = Some(watch);
     }
 
     /// Something happened; gives the entries of the log that it leads to.
@@ -128,6 +136,8 @@ impl OnlineState {
         let mut report = build::driven(watch.plan(), watch.network_status(), snapshot, &inner.base);
         report.on.clone_from(&inner.on);
         report.cards.clone_from(&inner.cards);
+        let ethernet = inner.ethernet.as_ref().map(EthernetWatch::report);
+        report.ethernet = ethernet.filter(|one| !one.is_idle());
         Some(report)
     }
 

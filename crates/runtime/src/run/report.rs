@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bring_up::BringUpReport;
 use super::real_time::GrantedRealTime;
+use crate::ethernet::EthernetReport;
 use crate::gateway::GatewayReport;
 use crate::serve::lateness::LatenessReport;
 
@@ -51,6 +52,9 @@ pub struct RunReport {
     /// What went through the mailbox gateway; `null`: there is none.
     #[serde(default)]
     pub gateway: Option<GatewayReport>,
+    /// What went through the virtual switch; `null`: no SubDevice speaks EoE, and no interface was wanted.
+    #[serde(default)]
+    pub ethernet: Option<EthernetReport>,
     /// Parts of this program that failed while the line was driven on, each with the reason and the next step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed: Vec<String>,

@@ -20,6 +20,7 @@ use super::diagnosis_thread::DiagnosisObserver;
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, of_plan};
+use crate::ethernet::VirtualEthernet;
 use crate::gateway::MailboxGateway;
 use crate::part::PartFailure;
 use crate::serve::lateness::Lateness;
@@ -65,6 +66,7 @@ pub struct RunSession<A> {
     lateness: Lateness,
     socket: Option<ServiceSocket>,
     gateway: Option<MailboxGateway>,
+    ethernet: Option<VirtualEthernet>,
     /// Left-out frames that were told, and nothing of more before that time.
     missed_told: (u64, Instant),
     begun_at: Instant,
@@ -128,15 +130,19 @@ impl<A: Application> RunSession<A> {
             lateness: self.lateness.report(),
             host: (&self.granted).into(),
             gateway: self.gateway.as_ref().map(MailboxGateway::report),
+            ethernet: self.ethernet.as_ref().and_then(VirtualEthernet::report),
             failed: Vec::new(),
             diagnosis: None,
         }
     }
 
-    /// Takes what is asked for through the socket and the mailbox gateway.
+    /// Takes what is asked for through the socket and the mailbox gateway, and frames for SubDevices.
     fn attend(&mut self, now: Instant, main: &mut MainDevice) {
         if let Some(gateway) = &mut self.gateway {
             gateway.turn(now, main);
+        }
+        if let Some(ethernet) = &mut self.ethernet {
+            ethernet.turn(now, main);
         }
         let Some(mut socket) = self.socket.take() else { return };
         socket.turn(now, main, |main| self.report(now, main));
@@ -164,13 +170,22 @@ impl<A: Application> SessionHooks for RunSession<A> {
         self.run.host(observation);
     }
 
-    fn event(&mut self, now: Instant, event: Event, main: &mut MainDevice) {
+    fn event(&mut self, now: Instant, mut event: Event, main: &mut MainDevice) {
+        if let (Some(ethernet), Event::Mailbox { id, kind, data }) =
+            (&mut self.ethernet, &mut event)
+            && ethernet.message(*id, *kind, data)
+        {
+            return;
+        }
         if let Event::Served { ticket, result, .. } = &event {
             if let Some(socket) = &mut self.socket {
                 socket.served(*ticket, result);
             }
             if let Some(gateway) = &mut self.gateway {
                 gateway.served(*ticket, result);
+            }
+            if let Some(ethernet) = &mut self.ethernet {
+                ethernet.served(*ticket, result);
             }
             self.run.application_mut().served(*ticket, result);
             return;
@@ -224,6 +239,8 @@ pub struct RunControls<'a> {
     pub socket: Option<ServiceSocket>,
     /// Mailbox messages of other programs.
     pub gateway: Option<MailboxGateway>,
+    /// Ethernet frames between SubDevices and this computer.
+    pub ethernet: Option<VirtualEthernet>,
 }
 
 /// Runs a line until its time is over, `stop`, or the application has enough; then stops it: outputs

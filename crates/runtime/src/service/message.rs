@@ -80,6 +80,8 @@ pub enum Asked {
     DescribeEntry { index: u16, subindex: u8, values: u8 },
     /// Set the addresses of an Ethernet port by EoE.
     SetAddresses { port: u8, data: String },
+    /// Send an Ethernet frame by EoE.
+    SendFrame { port: u8, number: u8, data: String },
     /// Write an identification number by SoE.
     WriteIdn { drive: u8, idn: u16, elements: u8, data: String },
     /// Fetch a file.
@@ -269,6 +271,9 @@ impl From<&MailboxRequest> for Asked {
             MailboxRequest::SetAddresses { port, parameters } => {
                 Self::SetAddresses { port: *port, data: to_hex(parameters) }
             }
+            MailboxRequest::SendFrame { port, number, frame } => {
+                Self::SendFrame { port: *port, number: *number, data: to_hex(frame) }
+            }
             MailboxRequest::WriteIdn { drive, idn, elements, data } => {
                 let (drive, idn, elements) = (*drive, idn.0, *elements);
                 Self::WriteIdn { drive, idn, elements, data: to_hex(data) }
@@ -317,6 +322,10 @@ impl Asked {
             Self::SetAddresses { port, data } => {
                 let parameters = from_hex(&data)?;
                 Service::Mailbox(MailboxRequest::SetAddresses { port, parameters })
+            }
+            Self::SendFrame { port, number, data } => {
+                let frame = from_hex(&data)?;
+                Service::Mailbox(MailboxRequest::SendFrame { port, number, frame })
             }
             Self::WriteIdn { drive, idn, elements, data } => {
                 let (idn, data) = (Idn(idn), from_hex(&data)?);

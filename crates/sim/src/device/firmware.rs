@@ -9,6 +9,7 @@ use linesman_proto::mailbox::coe::Emergency;
 use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
+use super::ethernet::EthernetSetup;
 use super::signal::{SignalId, Signals};
 use super::software_fault::SoftwareFault;
 use crate::controller::{Pdi, SyncSignal};
@@ -121,6 +122,11 @@ pub trait Firmware: Debug + Send {
     /// The value of its identification, as somebody sets it at its switches. False when it has no
     /// way of its own to tell it; then it goes into the station alias.
     fn identify(&mut self, _id: u16, _signals: &mut Signals) -> bool {
+        false
+    }
+
+    /// What is at its Ethernet side, for a device that speaks EoE. False when it does not, or has no such ports.
+    fn connect_ethernet(&mut self, _setup: &EthernetSetup) -> bool {
         false
     }
 

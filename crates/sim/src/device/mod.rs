@@ -13,6 +13,7 @@ pub mod described;
 pub mod dictionary;
 pub mod emulated;
 mod emulated_sii;
+pub mod ethernet;
 pub mod files;
 pub mod firmware;
 pub mod history;

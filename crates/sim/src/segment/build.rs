@@ -13,7 +13,7 @@ use linesman_proto::topology::wiring::ports_after;
 use linesman_proto::topology::{Link, Tree};
 
 use super::port_swap::swap_ports;
-use super::{DeviceInfo, Segment, build_deviations, identification, signal_wires};
+use super::{DeviceInfo, Segment, build_deviations, ethernet, identification, signal_wires};
 use crate::controller::{Controller, ControllerKinds, LocalClock};
 use crate::device::Signals;
 use crate::device::library::Built;
@@ -62,6 +62,14 @@ pub enum BuildError {
         place: &'static str,
         /// Its type.
         type_name: String,
+    },
+    /// The Ethernet side of a device cannot be so.
+    #[error("device `{device}`: ethernet: {why}")]
+    Ethernet {
+        /// Which device.
+        device: String,
+        /// What is wrong.
+        why: String,
     },
     /// The type that is to sit in another's place is not known.
     #[error("{entry}: {source}")]
@@ -211,7 +219,10 @@ fn make(
             type_name: one.planned.kind.name().to_owned(),
         });
     }
-    let Built { mut hardware, sii, firmware, outputs, inputs } = place.apply(built);
+    let Built { mut hardware, sii, mut firmware, outputs, inputs } = place.apply(built);
+    if one.planned.part == 0 {
+        ethernet::connect(&mut *firmware, device, &one.planned.name, one.id)?;
+    }
     let counting = &mut hardware.counting;
     let counts = device.counts_forwarded.or(file.counts_forwarded);
     counting.forwarded = counts.unwrap_or(counting.forwarded);

@@ -8,6 +8,7 @@ mod build;
 mod build_deviations;
 mod capture_probe;
 pub(crate) mod card;
+mod ethernet;
 mod from_controllers;
 mod identification;
 pub mod plug;

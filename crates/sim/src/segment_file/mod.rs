@@ -20,6 +20,7 @@
 //! several controllers counts several times, and those behind its first are called `J1/2`, `J1/3`.
 
 mod clock;
+mod ethernet;
 mod expand;
 mod passive;
 mod plant;
@@ -38,6 +39,7 @@ use linesman_config::project::Project;
 use serde::{Deserialize, Serialize};
 
 pub use clock::SegmentClock;
+pub use ethernet::{SegmentEthernet, SegmentHost};
 pub use expand::parse_counter;
 pub(crate) use expand::{DEFAULT_CABLE_M, Planned, expand, wiring};
 pub use plant::{PlantOptions, plant};
@@ -162,6 +164,9 @@ pub struct SegmentDevice {
     /// Those of its description unless said.
     #[serde(default)]
     pub slots: Option<Vec<String>>,
+    /// What is at its Ethernet side, for a device that speaks EoE: its IP address, or computers at its ports.
+    #[serde(default)]
+    pub ethernet: Option<SegmentEthernet>,
     /// Where its SII lies: `eeprom`; `shared`, in an EEPROM that its software reads, too, and that the
     /// MainDevice has to leave to it on the way to PREOP; `emulated`, in the memory of its processor.
     /// `eeprom` unless said; the others need a processor.
@@ -396,6 +401,7 @@ impl SegmentDevice {
             clock: None,
             counts_forwarded: None,
             slots: None,
+            ethernet: None,
             sii: None,
             counters: BTreeMap::new(),
         }

@@ -102,6 +102,10 @@ fn write_device(device: &SegmentDevice, text: &mut String) {
         let said = keys.into_iter().filter_map(|(key, value)| Some(format!("{key} = {}", value?)));
         line("clock", format!("{{ {} }}", said.collect::<Vec<_>>().join(", ")));
     }
+    if let Some(ethernet) = &device.ethernet {
+        let table = toml::Value::try_from(ethernet).map(|value| value.to_string());
+        line("ethernet", table.unwrap_or_default());
+    }
     if let Some(place) = device.sii {
         line("sii", quoted(place.name()));
     }

@@ -4,6 +4,7 @@ use linesman_runtime::online::report::{
     Count, FrameCounts, OnlineDevice, OnlinePort, OnlineReport,
 };
 
+use crate::command::run::ethernet::summary;
 use crate::output::{Output, Paint, Table};
 use crate::text::quantity::{count, grouped, time};
 
@@ -25,6 +26,9 @@ pub(super) fn text(report: &OnlineReport, last: Option<&OnlineReport>, output: &
     text.push_str(&devices(report, last, paint));
     text.push('\n');
     text.push_str(&frames(report));
+    if let Some(ethernet) = &report.ethernet {
+        text.push_str(&summary(ethernet));
+    }
     text.push_str(&log(report));
     text
 }

@@ -17,6 +17,7 @@ use serde::Serialize;
 
 use self::clock::ClockReport;
 use self::timing::PlanTimingReport;
+use super::ethernet::EthernetPlanReport;
 use crate::command::ebus::{self, EbusReport};
 use crate::version;
 
@@ -46,6 +47,8 @@ pub(crate) struct PlanReport {
     clock: Option<ClockReport>,
     /// The timing of SubDevices with SYNC0; `null` unless asked for (`--timing`).
     timing: Option<PlanTimingReport>,
+    /// Ethernet over EtherCAT; `null` unless asked for (`--ethernet`).
+    ethernet: Option<EthernetPlanReport>,
     /// What is doubtful, the worst first.
     findings: Vec<FindingReport>,
     /// What the file says and the plan leaves out.
@@ -209,7 +212,12 @@ struct FindingReport {
 }
 
 /// The report of a plan.
-pub(super) fn report(file: &PlanFile, doubts: &[Doubt], timing: Option<&PlanTiming>) -> PlanReport {
+pub(super) fn report(
+    file: &PlanFile,
+    doubts: &[Doubt],
+    timing: Option<&PlanTiming>,
+    ethernet: Option<EthernetPlanReport>,
+) -> PlanReport {
     let plan = &file.plan;
     let present = Presence::full(plan.devices.len());
     let mut number = 0..;
@@ -242,6 +250,7 @@ pub(super) fn report(file: &PlanFile, doubts: &[Doubt], timing: Option<&PlanTimi
         }),
         clock: clock::of(plan),
         timing: timing.map(|timing| timing::of(plan, timing)),
+        ethernet,
         findings: doubts.iter().map(finding).collect(),
         notes: file.notes.clone(),
     }

@@ -371,6 +371,9 @@ pub(super) fn summary(report: &RunReport, paint: Paint) -> String {
     if let Some(gateway) = &report.gateway {
         text.push_str(&super::gateway::summary(gateway));
     }
+    if let Some(ethernet) = &report.ethernet {
+        text.push_str(&super::ethernet::summary(ethernet));
+    }
     text
 }
 

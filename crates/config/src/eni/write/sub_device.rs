@@ -369,6 +369,7 @@ fn ours(xml: &mut Xml, device: &DevicePlan, plan: &Plan) {
         ("restore-state", u8::from(settings.keeping.restore_state).to_string()),
         ("reinitialise", u8::from(settings.keeping.reinitialise).to_string()),
         ("clear-counters", u8::from(settings.keeping.clear_counters).to_string()),
+        ("forward-ethernet", u8::from(settings.keeping.forward_ethernet).to_string()),
         ("entry", plan.tree.entry(device.id.index()).to_string()),
     ];
     if let Some(mailbox) = &device.mailbox {

@@ -43,6 +43,12 @@ pub enum Refused {
 }
 
 impl Assembly {
+    /// True if a frame has begun whose last fragment is still to come.
+    #[must_use]
+    pub const fn is_begun(&self) -> bool {
+        self.begun
+    }
+
     /// Takes a fragment; gives the frame when it was the last one.
     ///
     /// # Errors

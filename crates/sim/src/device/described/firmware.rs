@@ -13,6 +13,7 @@ use crate::device::application::Channel;
 use crate::device::application::drive::Cia402;
 use crate::device::application::oversampling::{Oversampling, SampleBuffer, Sampled};
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
+use crate::device::ethernet::EthernetFunction;
 use crate::device::files::{Files, FirmwareSlot};
 use crate::device::firmware::{Firmware, NoFirmware};
 use crate::device::processor::{BusAccess, Description, ProcessBuffer, Processor, ResponseTimes};
@@ -131,6 +132,7 @@ fn processor(
         bootstrap: bootstrap.is_present().then_some(bootstrap),
         times: if layout.axis.is_some() { ResponseTimes::DRIVE } else { ResponseTimes::TERMINAL },
         bus: BusAccess::of(described.image.sync_managers().iter().map(|one| one.start)),
+        ethernet: EthernetFunction::IpApplication,
         unit_alone: described.image.op_modes().any(|mode| mode.assign_activate & 0x0700 == 0x0100),
     });
     processor.with_files(files)

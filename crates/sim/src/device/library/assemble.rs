@@ -19,6 +19,7 @@ use crate::device::application::time_stamp::TimeStamps;
 use crate::device::application::two_times::TwoTimes;
 use crate::device::dictionary::Dictionary;
 use crate::device::emulated::{DigitalArea, Emulated, WordArea};
+use crate::device::ethernet::EthernetFunction;
 use crate::device::firmware::Firmware;
 use crate::device::processor::{BusAccess, Description, ProcessBuffer, Processor};
 use crate::device::signal::{SignalId, Signals};
@@ -102,6 +103,19 @@ fn with_processor(
         excludes: Vec::new(),
         mailbox: spec.mailbox(),
         protocols: Protocols(spec.protocols),
+        ethernet: match processor.function {
+            Function::SwitchPorts { ports } => EthernetFunction::SwitchPorts(ports),
+            Function::None
+            | Function::DigitalOutputs { .. }
+            | Function::AnalogInputs { .. }
+            | Function::AnalogOutputs { .. }
+            | Function::AnalogInputsOutputs { .. }
+            | Function::Stepper
+            | Function::Cia402
+            | Function::Sercos
+            | Function::TwoTimes
+            | Function::Bridge { .. } => EthernetFunction::IpApplication,
+        },
         bootstrap: Some(image::bootstrap(spec)),
         times: processor.times,
         bus: BusAccess::Words,
@@ -119,7 +133,7 @@ fn channels(
     inputs: &[SignalId],
 ) -> Channels {
     match function {
-        Function::None => Vec::new(),
+        Function::None | Function::SwitchPorts { .. } => Vec::new(),
         Function::DigitalOutputs { .. } => (0u16..)
             .zip(outputs)
             .map(|(channel, signal)| {

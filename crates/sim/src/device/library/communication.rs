@@ -17,13 +17,16 @@ use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Mii};
 
 const SWITCH_PORT_PROCESSOR: ProcessorSpec = ProcessorSpec {
-    function: Function::None,
+    function: Function::SwitchPorts { ports: 1 },
     hardware_version: "10",
     software_version: "11",
     settings: &[],
     variables: &[],
     times: ResponseTimes::TERMINAL,
 };
+
+const FOUR_PORTS_PROCESSOR: ProcessorSpec =
+    ProcessorSpec { function: Function::SwitchPorts { ports: 4 }, ..SWITCH_PORT_PROCESSOR };
 
 /// Ethernet frames go through the mailbox: no process data.
 const SWITCH_PORT: Spec = Spec {
@@ -201,6 +204,7 @@ pub(super) const TYPES: &[LibraryType] = &[
         product: 0x19D6_3052,
         revision: 0x0015_0000,
         ebus_current_ma: 310,
+        application: ApplicationSpec::Processor(&FOUR_PORTS_PROCESSOR),
         ..SWITCH_PORT
     }]),
     // Its clock of another time is its one signal: how far that time is ahead, in ns. Nothing is

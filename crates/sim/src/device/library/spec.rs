@@ -136,6 +136,11 @@ pub(super) enum Function {
         /// What they measure and give.
         range: Range,
     },
+    /// Ethernet ports, and no process data.
+    SwitchPorts {
+        /// How many.
+        ports: u8,
+    },
     /// One axis of a stepper motor.
     Stepper,
     /// One axis of a drive of CiA 402.
@@ -160,7 +165,7 @@ impl Function {
     /// Signals driven and taken.
     const fn signals(self) -> (usize, usize) {
         match self {
-            Self::None => (0, 0),
+            Self::None | Self::SwitchPorts { .. } => (0, 0),
             Self::DigitalOutputs { channels } | Self::AnalogOutputs { channels, .. } => {
                 (channels as usize, 0)
             }

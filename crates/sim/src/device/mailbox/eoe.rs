@@ -1,26 +1,62 @@
-//! EoE of a device with Ethernet ports of its own: addresses are set and read, frames leave by the
-//! port.
+//! EoE of a device: addresses are set and read, frames go to its [`EthernetSide`] and come from there.
 //!
-//! Read first: ETG.1000.6, EoE; facts 6.6. Nothing is plugged into the port, so a frame that came
-//! together is gone; whoever wants to know when it left is told, at once.
+//! Read first: ETG.1000.6, EoE; facts 6.6. Whoever wants to know when a frame left is told, at once.
 
-use linesman_proto::mailbox::ErrorReplyCode;
+use std::collections::VecDeque;
+
 use linesman_proto::mailbox::eoe::{
     ADDRESS_LEN, Assembly, EOE_HEADER_LEN, EoeError, EoeResult, Fragment, IpParameters, Message,
-    Setting,
+    Setting, fragments,
 };
+use linesman_proto::mailbox::{ErrorReplyCode, HEADER_LEN};
 use linesman_proto::time::Instant;
 
 use super::Answers;
+use crate::device::ethernet::EthernetSide;
 
 /// The port.
-#[derive(Clone, PartialEq, Eq, Default, Debug)]
+#[derive(Default, Debug)]
 pub(super) struct EoePort {
     addresses: IpParameters,
     assembly: Assembly,
+    side: Option<EthernetSide>,
+    /// Fragments of the frame that is being sent.
+    fragments: VecDeque<Vec<u8>>,
+    /// Number of the next frame, 0 to 15.
+    number: u8,
 }
 
 impl EoePort {
+    /// Frames go there from now on.
+    pub(super) fn connect(&mut self, side: EthernetSide) {
+        self.side = Some(side);
+    }
+
+    /// The device has started anew.
+    pub(super) fn restarted(mut self) -> Self {
+        self.side.iter_mut().for_each(EthernetSide::restart);
+        Self { side: self.side, ..Self::default() }
+    }
+
+    /// Does what is to be done now; says when to come again.
+    pub(super) fn handle_timeout(&mut self, now: Instant) -> Option<Instant> {
+        let side = self.side.as_mut()?;
+        side.handle_timeout(now);
+        side.poll_timeout(now)
+    }
+
+    /// The next fragment for the MainDevice, for a mailbox of so many bytes.
+    pub(super) fn poll_fragment(&mut self, mailbox: usize) -> Option<Vec<u8>> {
+        if self.fragments.is_empty() {
+            let frame = self.side.as_mut()?.poll_transmit()?;
+            let room = mailbox.saturating_sub(HEADER_LEN);
+            let pieces = fragments(&frame, 0, self.number, room);
+            self.fragments = pieces.map(|piece| write(&Message::Fragment(piece))).collect();
+            self.number = (self.number + 1) & 0x0F;
+        }
+        self.fragments.pop_front()
+    }
+
     /// Answers a message, if it asks for an answer.
     pub(super) fn answer(
         &mut self,
@@ -43,8 +79,11 @@ impl EoePort {
 
     /// A frame of which a piece is missing is forgotten without a word, as on any Ethernet.
     fn take(&mut self, fragment: &Fragment<'_>, now: Instant) -> Answers {
-        let sent = matches!(self.assembly.take(fragment), Ok(Some(_)));
-        if !(sent && fragment.time_requested) {
+        let Ok(Some(frame)) = self.assembly.take(fragment) else { return Vec::new() };
+        if let Some(side) = &mut self.side {
+            side.handle_frame(&frame);
+        }
+        if !fragment.time_requested {
             return Vec::new();
         }
         let time = now.as_nanos() as u32;
@@ -58,6 +97,9 @@ impl EoePort {
             Setting::SetIp => match IpParameters::parse(parameters) {
                 Some(newer) => {
                     self.addresses = self.addresses.merged(newer);
+                    if let Some(side) = &mut self.side {
+                        side.set_addresses(&self.addresses);
+                    }
                     (EoeResult::SUCCESS, 0)
                 }
                 None => (EoeResult::UNSPECIFIED, 0),
@@ -73,7 +115,13 @@ impl EoePort {
 }
 
 fn write(message: &Message<'_>) -> Vec<u8> {
-    let mut buffer = vec![0; EOE_HEADER_LEN + ADDRESS_LEN];
+    let body = match message {
+        Message::Fragment(fragment) => fragment.data.len(),
+        Message::TimeStamp { .. } | Message::Request { .. } | Message::Response { .. } => {
+            ADDRESS_LEN
+        }
+    };
+    let mut buffer = vec![0; EOE_HEADER_LEN + body];
     let len = message.write(&mut buffer).unwrap_or(0);
     buffer.truncate(len);
     buffer

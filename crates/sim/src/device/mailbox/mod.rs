@@ -28,6 +28,7 @@ use self::foe::FoeServer;
 pub use self::object_server::ObjectServer;
 use self::outbox::{Envelope, Outbox};
 use super::dictionary::Dictionary;
+use super::ethernet::EthernetSide;
 use super::files::Files;
 use super::software_fault::{SoftwareFault, SoftwareFaults};
 use crate::controller::Pdi;
@@ -40,6 +41,8 @@ pub const ANSWERS: u8 = 1;
 const WAITING: usize = 4;
 /// Emergencies that wait to be sent; further ones are forgotten.
 const UNTOLD: usize = 8;
+/// How soon a device looks at its Ethernet side again.
+const SOONEST: Span = Span::us(100);
 /// How soon a full mailbox is looked at again, where its SyncManager tells nothing.
 const LOOK_AGAIN: Span = Span::ms(1);
 
@@ -57,7 +60,7 @@ pub struct Served<'a> {
 }
 
 /// The mailbox.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Mailbox {
     protocols: Protocols,
     coe: CoeServer,
@@ -92,7 +95,13 @@ impl Mailbox {
 
     /// INIT is left, or entered: whatever was under way is forgotten.
     pub fn restart(&mut self) {
-        *self = Self::new(self.response_time, self.protocols);
+        let eoe = std::mem::take(&mut self.eoe).restarted();
+        *self = Self { eoe, ..Self::new(self.response_time, self.protocols) };
+    }
+
+    /// Frames of EoE go there from now on.
+    pub fn connect(&mut self, side: EthernetSide) {
+        self.eoe.connect(side);
     }
 
     /// The next message has this counter: the device sent others before.
@@ -132,12 +141,28 @@ impl Mailbox {
             }
         }
         self.tell(served.state);
+        let frames = self.frames(now, pdi, served.state);
         if fills {
             self.outbox.deliver(pdi);
         }
         let due = self.request.as_ref().map(|(_, due)| *due);
         let again = (self.outbox.len() > 0 && fills).then(|| now + LOOK_AGAIN);
-        [due, again].into_iter().flatten().min()
+        [due, again, frames].into_iter().flatten().min()
+    }
+
+    /// Puts fragments of Ethernet frames among the messages that wait, and says when to look again. Room for an answer is
+    /// left.
+    fn frames(&mut self, now: Instant, pdi: &Pdi<'_>, state: AlState) -> Option<Instant> {
+        if state == AlState::Boot || !self.protocols.has(Protocols::EOE) {
+            return None;
+        }
+        let due = self.eoe.handle_timeout(now);
+        while self.outbox.len() + 1 < WAITING
+            && let Some(fragment) = self.eoe.poll_fragment(answer_room(pdi))
+        {
+            self.outbox.push(MailboxType::Eoe, Envelope::UNASKED, fragment);
+        }
+        Some(due?.max(now + SOONEST))
     }
 
     /// Takes a request out of SyncManager 0.

@@ -1,6 +1,7 @@
 //! Firmware interface of a device with a processor, as its controller calls it.
 
 use linesman_proto::mailbox::coe::Emergency;
+use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
 
@@ -8,6 +9,7 @@ use super::areas::Areas;
 use super::{Processor, UNTOLD};
 use crate::controller::{Pdi, SyncSignal};
 use crate::device::application_layer::{ApplicationLayer, Refusal};
+use crate::device::ethernet::{EthernetFunction, EthernetSetup, EthernetSide, HostAddress};
 use crate::device::firmware::{Firmware, SampleAgain};
 use crate::device::history::History;
 use crate::device::mailbox::Served;
@@ -101,6 +103,21 @@ impl Firmware for Processor {
     fn identify(&mut self, id: u16, _signals: &mut Signals) -> bool {
         self.application_layer.identify(id);
         true
+    }
+
+    fn connect_ethernet(&mut self, setup: &EthernetSetup) -> bool {
+        let function = self.description.ethernet;
+        let (ports, has_own) = match function {
+            EthernetFunction::SwitchPorts(ports) => (ports, false),
+            EthernetFunction::IpApplication => (0, true),
+        };
+        let fits = setup.hosts.iter().all(|host| (1..=ports).contains(&host.port))
+            && (has_own || setup.address == HostAddress::None);
+        let speaks = self.description.protocols.has(Protocols::EOE);
+        if speaks && fits {
+            self.mailbox.connect(EthernetSide::new(function, setup));
+        }
+        speaks && fits
     }
 
     fn read_sii(&mut self) {

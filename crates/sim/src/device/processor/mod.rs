@@ -26,6 +26,7 @@ use self::synchronisation::Synchronisation;
 use super::application::Channel;
 use super::application_layer::ApplicationLayer;
 use super::dictionary::Dictionary;
+use super::ethernet::EthernetFunction;
 use super::files::Files;
 use super::history::History;
 use super::mailbox::Mailbox;
@@ -94,6 +95,8 @@ pub struct Description {
     pub mailbox: MailboxPair,
     /// What its mailbox speaks.
     pub protocols: Protocols,
+    /// What it does with Ethernet frames, where it speaks EoE.
+    pub ethernet: EthernetFunction,
     /// The mailbox in BOOT, for a device that knows BOOT.
     pub bootstrap: Option<MailboxPair>,
     /// How quick it is.
