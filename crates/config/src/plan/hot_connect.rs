@@ -79,7 +79,7 @@ impl Plan {
         self.group_of(id).is_some_and(|group| group.optional)
     }
 
-    /// The planned SubDevice of this identity that is to tell this number at this source; `None` where
+    /// The planned SubDevice of this type that is to tell this number at this source; `None` where
     /// none is planned.
     #[must_use]
     pub fn device_with(
@@ -91,8 +91,9 @@ impl Plan {
         let fits = |device: &&DevicePlan| {
             let is_meant =
                 |check: IdentificationCheck| check.source == source && check.value == number;
+            let planned = Identity { serial_number: 0, ..device.identity };
             device.settings.identification.is_some_and(is_meant)
-                && mismatch(&device.identity, found, device.revision_rule).is_none()
+                && mismatch(&planned, found, device.revision_rule).is_none()
         };
         self.devices.iter().find(fits)
     }
