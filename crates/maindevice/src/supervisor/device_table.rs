@@ -15,6 +15,7 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{DcTime, Instant, Span};
 
+use super::group_table::GroupTable;
 use super::times::{BringUpTimes, Phase};
 use crate::executor::lock;
 use crate::executor::waitlist::Waitlist;
@@ -89,6 +90,9 @@ pub(crate) struct DeviceTable {
     changed: Vec<DeviceId>,
     /// How many are at their targets.
     reached: usize,
+    /// How many are not there, and need not be.
+    excused: usize,
+    pub(super) groups: GroupTable,
     responding: Option<WorkingCounter>,
     states: Option<OredStates>,
     all_reached: bool,
@@ -114,7 +118,8 @@ impl DeviceTable {
         };
         let devices = plan.devices.iter().map(live).collect();
         let times = Some(BringUpTimes::new(count));
-        Self { devices, changed, times, ..Self::default() }
+        let groups = GroupTable::new(plan);
+        Self { devices, changed, times, groups, ..Self::default() }
     }
 
     /// Changes whenever presence or "settled" changes.
@@ -191,6 +196,10 @@ impl DeviceTable {
             ..DeviceEntry::default()
         };
         *live = new;
+        if self.groups.is_optional(id) {
+            self.excused += usize::from(found == Reachability::Lost);
+            self.excused -= usize::from(before == Reachability::Lost);
+        }
         self.set_at_target(id, false);
         before
     }
@@ -228,9 +237,9 @@ impl DeviceTable {
         self.reached = self.reached + usize::from(reached) - usize::from(before);
     }
 
-    /// Whether all are where they shall be.
+    /// Whether all are where they shall be, but for those that may be absent and are.
     pub(crate) fn have_all_reached(&self) -> bool {
-        self.reached == self.devices.len()
+        self.reached + self.excused == self.devices.len()
     }
 
     fn changes(&mut self, id: DeviceId) {
@@ -328,6 +337,14 @@ impl DeviceTable {
     /// The states in which the SubDevices shall be now, by [`DeviceId`].
     pub(crate) fn all_wanted(&self) -> Vec<AlState> {
         (0..self.devices.len() as u32).map(|id| self.wanted(DeviceId(id))).collect()
+    }
+
+    /// The states of those that should be there.
+    pub(crate) fn all_expected(&self) -> Vec<AlState> {
+        let is_excused =
+            |id: &DeviceId| self.groups.is_optional(*id) && self.found(*id) == Reachability::Lost;
+        let all = (0..self.devices.len() as u32).map(DeviceId);
+        all.filter(|id| !is_excused(id)).map(|id| self.wanted(id)).collect()
     }
 
     /// Asks for a state of a SubDevice, whatever the plan says. False when there is no such SubDevice.

@@ -7,6 +7,7 @@ mod al_errors;
 mod bench;
 mod clocks;
 mod described;
+mod hot_connect;
 mod library;
 mod loop_control;
 mod mailbox;
