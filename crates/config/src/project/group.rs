@@ -1,6 +1,8 @@
 //! Hot connect groups of a project: `[[group]]`, and the numbers that tell equal devices apart:
 //! `identification`.
 
+use std::collections::BTreeMap;
+
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::register::AL_STATUS_CODE;
 use linesman_proto::sii::Identification;
@@ -174,6 +176,20 @@ impl Project {
         let tree = self.tree().ok()?;
         let node = self.node(device)?;
         self.groups.iter().find(|group| self.members(&tree, group).contains(&node))
+    }
+
+    /// Devices of groups that may be absent, each with the first device of its group, by their places in the
+    /// project.
+    #[must_use]
+    pub fn optional_devices(&self) -> BTreeMap<usize, usize> {
+        let Ok(tree) = self.tree() else { return BTreeMap::new() };
+        let groups = self.groups.iter().filter(|group| group.optional);
+        let members = groups.flat_map(|group| {
+            let members = self.members(&tree, group);
+            let first = members.first().copied().unwrap_or_default();
+            members.into_iter().map(move |member| (member, first))
+        });
+        members.collect()
     }
 
     fn node(&self, name: &str) -> Option<usize> {

@@ -5,6 +5,7 @@ use linesman_proto::port::Port;
 use linesman_proto::topology::End;
 
 use super::*;
+use crate::compare::{Comparison, Difference};
 use crate::plan::{Doubt, Plan, Role};
 
 /// A coupler with a branch, and a tool behind it: a coupler with a selector and two terminals.
@@ -219,6 +220,19 @@ fn a_group_begins_at_a_coupler_or_a_device_with_a_cable_and_not_at_a_terminal() 
     let doubt = named(&plan(&terminal), "group-terminal").unwrap();
     assert!(doubt.text.contains("tool begins at T2, a terminal on the E-bus"), "{}", doubt.text);
     assert_eq!(doubt.severity, crate::plan::Severity::Error);
+}
+
+#[test]
+fn a_group_that_is_absent_or_elsewhere_is_no_difference_from_the_plan() {
+    let project = Project::parse(MACHINE).unwrap();
+    let may_go = project.optional_devices();
+    assert_eq!(may_go, [(2, 2), (3, 2), (4, 2), (5, 2)].into());
+    let missing = |planned: usize, all: Vec<usize>| Difference::Missing { planned, all };
+    let moved = |planned: usize| Difference::Moved { planned, found: 1, wanted: None, on: None };
+    let differences = vec![missing(2, vec![2, 3, 4, 5]), missing(1, vec![1]), moved(2), moved(1)];
+    let comparison = Comparison { pairs: Vec::new(), differences };
+    let left = comparison.without_groups(|node| may_go.contains_key(&node)).differences;
+    assert_eq!(left, [missing(1, vec![1]), moved(1)]);
 }
 
 // proves: HC-10
