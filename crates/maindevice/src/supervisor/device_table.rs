@@ -2,11 +2,9 @@
 //! by the supervisors, which fill it.
 
 use std::collections::BTreeSet;
-use std::future::Future;
-use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
-use std::task::{Context, Poll, Waker};
+use std::task::Waker;
 
 use linesman_config::plan::expect::{Presence, Served};
 use linesman_config::plan::{DevicePlan, Plan};
@@ -17,9 +15,7 @@ use linesman_proto::time::{DcTime, Instant, Span};
 
 use super::group_table::GroupTable;
 use super::times::{BringUpTimes, Phase};
-use crate::executor::lock;
 use crate::executor::waitlist::Waitlist;
-use crate::executor::wire::Sleep;
 
 /// Whether and how a SubDevice can be reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -83,9 +79,9 @@ pub(crate) struct DeviceTable {
     devices: Vec<DeviceEntry>,
     /// Shared, so that the cycle sees without a lock whether anything has changed.
     version: Arc<AtomicU64>,
-    alerts: u64,
+    pub(super) alerts: u64,
     /// Sleeps that an alert ends, in the order in which they began.
-    waiting: Waitlist<Waker>,
+    pub(super) waiting: Waitlist<Waker>,
     /// Devices whose presence has changed since [`DeviceTable::take_changes`].
     changed: Vec<DeviceId>,
     /// How many are at their targets.
@@ -456,42 +452,5 @@ impl DeviceTable {
 
     pub(crate) fn alerts(&self) -> u64 {
         self.alerts
-    }
-}
-
-/// Sleeps, but no longer than until the next alert.
-pub(crate) struct AlertSleep {
-    pub(crate) device_table: Arc<Mutex<DeviceTable>>,
-    /// The last alert that was acted upon.
-    pub(crate) seen: u64,
-    pub(crate) sleep: Sleep,
-    /// Its place among those that wait.
-    pub(crate) place: Option<u64>,
-}
-
-impl Future for AlertSleep {
-    type Output = ();
-
-    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        let mut device_table = lock(&self.device_table);
-        if device_table.alerts != self.seen {
-            return Poll::Ready(());
-        }
-        if self.place.is_none() {
-            let place = device_table.waiting.insert(context.waker().clone());
-            drop(device_table);
-            self.place = Some(place);
-        } else {
-            drop(device_table);
-        }
-        Pin::new(&mut self.sleep).poll(context)
-    }
-}
-
-impl Drop for AlertSleep {
-    fn drop(&mut self) {
-        if let Some(place) = self.place {
-            lock(&self.device_table).waiting.remove(place);
-        }
     }
 }

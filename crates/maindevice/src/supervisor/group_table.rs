@@ -22,7 +22,7 @@ struct GroupEntry {
 
 /// Why a SubDevice, or a group, is not taken: told once, and again when it was gone meanwhile.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) enum Refusal {
+pub(super) enum NotTaken {
     /// It tells another number, or none.
     Number(Option<u32>),
     /// So many tell its number.
@@ -38,7 +38,7 @@ pub(crate) struct GroupTable {
     /// The group of each SubDevice that is in one, and whether it may be absent.
     members: BTreeMap<DeviceId, (usize, bool)>,
     /// Who was not taken and why, with the search in which that was seen last.
-    refusals: BTreeMap<(DeviceId, Refusal), u64>,
+    refusals: BTreeMap<(DeviceId, NotTaken), u64>,
     searches: u64,
 }
 
@@ -97,7 +97,7 @@ impl GroupTable {
     }
 
     /// Notes why a SubDevice is not taken; true if that is news.
-    pub(super) fn refuse(&mut self, id: DeviceId, refusal: Refusal) -> bool {
+    pub(super) fn refuse(&mut self, id: DeviceId, refusal: NotTaken) -> bool {
         self.refusals.insert((id, refusal), self.searches).is_none()
     }
 

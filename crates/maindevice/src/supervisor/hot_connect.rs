@@ -19,7 +19,7 @@ use linesman_proto::register::{DL_STATUS, DlStatus, STATION_ADDRESS};
 use linesman_proto::sii::Identity;
 use linesman_proto::topology::{End, Reconstruction, SeenController, Tree};
 
-use super::group_table::{GroupPlace, Refusal};
+use super::group_table::{GroupPlace, NotTaken};
 use super::locate::{FoundController, identify, stretch};
 use super::{Context, Reachability};
 use crate::event::Event;
@@ -39,7 +39,7 @@ pub(super) struct FoundGroup {
 }
 
 /// What was seen, and what was learnt of it.
-struct Line<'a> {
+struct GroupSearch<'a> {
     context: &'a Context,
     seen: Vec<FoundController>,
     trees: Vec<(Range<usize>, Tree)>,
@@ -54,7 +54,7 @@ pub(super) async fn claim(
     if context.plan.groups.is_empty() {
         return (Vec::new(), seen);
     }
-    let mut line = Line { context, seen, trees: Vec::new() };
+    let mut line = GroupSearch { context, seen, trees: Vec::new() };
     let unknown: Vec<usize> = line.unknown();
     if unknown.is_empty() {
         let rest = line.rest(&[]);
@@ -102,7 +102,7 @@ pub(super) async fn settle(context: &Context, found: Vec<FoundGroup>) {
         if is_new {
             let place = place(context, above).await;
             if !may_be_at(planned, place) {
-                let refusal = Refusal::Place(place);
+                let refusal = NotTaken::Place(place);
                 if lock(&context.device_table).groups.refuse(planned.first(), refusal) {
                     context.wire.emit(Event::GroupMisplaced { group, place });
                 }
@@ -115,7 +115,7 @@ pub(super) async fn settle(context: &Context, found: Vec<FoundGroup>) {
     }
 }
 
-impl Line<'_> {
+impl GroupSearch<'_> {
     /// The group member that a controller is, by its station address alone.
     fn member(&self, at: usize) -> Option<DeviceId> {
         let station = self.seen.get(at)?.station;
@@ -198,7 +198,7 @@ impl Line<'_> {
             let id = self.context.plan.groups[group].first();
             let Some(check) = self.check(id) else { continue };
             let count = u16::try_from(count).unwrap_or(u16::MAX);
-            let refusal = Refusal::Shared(count);
+            let refusal = NotTaken::Shared(count);
             if lock(&self.context.device_table).groups.refuse(id, refusal) {
                 self.context.wire.emit(Event::IdentificationShared { id, check, count });
             }
@@ -245,7 +245,7 @@ impl Line<'_> {
         let Some(id) = self.context.plan.groups.get(group).map(HotConnectGroup::first) else {
             return;
         };
-        if lock(&self.context.device_table).groups.refuse(id, Refusal::Number(found)) {
+        if lock(&self.context.device_table).groups.refuse(id, NotTaken::Number(found)) {
             let event = Event::WrongIdentification { id, check, found, belongs_to: None };
             self.context.wire.emit(event);
         }

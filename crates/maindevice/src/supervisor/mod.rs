@@ -5,6 +5,7 @@
 //! out; [`supervise`] starts them and looks for those that are lost. [`mod@device_table`] is what they know,
 //! [`rounds`] finds out for all of them at once where they do not read by themselves.
 
+mod alert_sleep;
 mod align;
 mod by_alias;
 mod clocks;
@@ -39,7 +40,8 @@ use crate::options::{Options, Polling};
 use crate::procedure::read_only_scan::AL_LEN;
 use crate::procedure::scan::ScanCache;
 
-pub(crate) use device_table::{AlertSleep, DeviceTable, Reachability, ReferenceClock};
+pub(crate) use alert_sleep::AlertSleep;
+pub(crate) use device_table::{DeviceTable, Reachability, ReferenceClock};
 pub use group_table::GroupPlace;
 pub use start_up::StartUpError;
 pub use times::{BringUpTimes, DeviceTimes, Phase};

@@ -10,7 +10,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::sii::Identity;
 
 use super::Context;
-use super::group_table::Refusal;
+use super::group_table::NotTaken;
 use super::hot_connect::leave_alone;
 use super::locate::FoundController;
 use crate::event::Event;
@@ -92,7 +92,7 @@ impl Numbers {
             lock(&context.device_table).groups.accept(id);
             return false;
         };
-        if lock(&context.device_table).groups.refuse(id, Refusal::Number(found)) {
+        if lock(&context.device_table).groups.refuse(id, NotTaken::Number(found)) {
             let identity = seen.identity.unwrap_or_default();
             let owner = found.and_then(|found| {
                 self.plan.device_with(&identity, check.source, found).map(|device| device.id)

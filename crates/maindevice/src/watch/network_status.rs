@@ -65,6 +65,11 @@ impl NetworkStatus {
         (members().count(), members().filter(is_there).count())
     }
 
+    /// How many SubDevices are not there, and may be absent.
+    pub(super) fn excused(&self) -> usize {
+        self.devices.iter().filter(|device| device.is_excused()).count()
+    }
+
     /// All SubDevices in the order of a topology list: those that are always there in processing order, then
     /// the groups (HC-15).
     #[must_use]

@@ -51,9 +51,13 @@ pub(super) fn of(
         Event::AllReached => vec![words.line(
             Severity::Info,
             EntryKind::State,
-            match words.plan.devices.len() {
-                1 => "the SubDevice has reached its state".to_owned(),
-                count => format!("all {count} SubDevices have reached their states"),
+            match (words.plan.devices.len(), network_status.excused()) {
+                (1, _) => "the SubDevice has reached its state".to_owned(),
+                (count, 0) => format!("all {count} SubDevices have reached their states"),
+                (count, absent) => format!(
+                    "{} SubDevices have reached their states; {absent} of hot connect groups are not plugged in",
+                    count.saturating_sub(absent)
+                ),
             },
         )],
         Event::DeviceBack { id, restarted } => {

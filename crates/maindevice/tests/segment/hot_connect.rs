@@ -229,9 +229,8 @@ fn the_same_group_joins_at_two_places_and_two_groups_at_once() {
     assert_eq!(bench.bad_cycles, 0);
 }
 
-// proves: HC-15
 #[test]
-fn groups_stand_last_in_the_topology_list_with_planned_and_present_counts() {
+fn a_running_line_counts_the_subdevices_of_groups_that_are_there() {
     let plan = plan(PLANT, &TOOLS);
     let mut bench = running(PLANT, &plan, &["X", "Y"]);
     let names = |bench: &Bench| -> Vec<String> {
@@ -355,7 +354,7 @@ fn drives(first: u16, second: u16) -> String {
     )
 }
 
-// proves: HC-04 (S)
+// proves: HC-04 (S), HC-14 (S)
 #[test]
 fn two_equal_drives_that_were_exchanged_are_found_out_and_neither_moves() {
     let wanted = Wanted { numbers: &[("A", 11), ("B", 12)], ..Wanted::default() };
@@ -381,7 +380,6 @@ fn two_equal_drives_that_were_exchanged_are_found_out_and_neither_moves() {
     assert!(said.contains("must be 11, found 12, that of B: they may be exchanged"), "{said}");
 }
 
-// proves: HC-14 (S)
 #[test]
 fn a_number_that_is_not_compulsory_is_told_and_the_subdevice_driven_all_the_same() {
     let numbers = &[("A", 11), ("B", 12)];
