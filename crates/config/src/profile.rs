@@ -8,7 +8,8 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{SmControl, SmMode};
 use linesman_proto::sii::{
-    Direction, FmmuUsage, Image, MailboxPair, OpMode, PortKind, Protocols, SyncManagerKind,
+    Direction, FmmuUsage, Identification, Image, MailboxPair, OpMode, PortKind, Protocols,
+    SyncManagerKind,
 };
 use linesman_proto::time::Span;
 
@@ -82,6 +83,8 @@ pub struct DeviceProfile {
     pub spare_pdos: Vec<MappedPdo>,
     /// What its FMMUs are meant for, in their order; empty when nothing is said.
     pub fmmus: Vec<FmmuUsage>,
+    /// Where the number of its selector is read.
+    pub identification: Identification,
     /// Its operation modes with distributed clocks.
     pub clock_modes: Vec<ClockMode>,
     /// What it needs for its work in a cycle, as far as its dictionary says; an SII says nothing.
@@ -185,6 +188,8 @@ impl DeviceProfile {
             spare_pdos: pdos(image, false),
             clock_modes: image.op_modes().map(|mode| clock_mode(image, mode)).collect(),
             fmmus: image.fmmu_usages().to_vec(),
+            identification: general
+                .map_or(Identification::None, linesman_proto::sii::General::identification),
             sync_times: SyncTimes::default(),
         }
     }

@@ -2,6 +2,7 @@
 
 use linesman_config::identity::Mismatch;
 use linesman_config::inventory::Inventory;
+use linesman_config::plan::IdentificationCheck;
 use linesman_config::start_up::StartUpCommand;
 use linesman_proto::address::{DeviceId, Position, StationAddress, StationAlias, WorkingCounter};
 use linesman_proto::mailbox::MailboxType;
@@ -17,7 +18,7 @@ use crate::mailbox::MailboxFailure;
 use crate::main_device::ProbeRequest;
 use crate::procedure::{ClockError, ReadOnlyScan, ReadOnlyScanError, ScanError};
 use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
-use crate::supervisor::StartUpError;
+use crate::supervisor::{GroupPlace, StartUpError};
 
 mod text;
 
@@ -224,6 +225,46 @@ pub enum Event {
         alias: StationAlias,
         /// How many answer to it.
         count: u16,
+    },
+    /// A SubDevice of the right type tells another number than the planned one, or none. Where the number is
+    /// compulsory it is kept in INIT. Told once.
+    WrongIdentification {
+        /// Which one is planned.
+        id: DeviceId,
+        /// What it must tell.
+        check: IdentificationCheck,
+        /// What it tells; `None`: it tells none.
+        found: Option<u32>,
+        /// Whose number that is, if it is that of another planned SubDevice: they may be exchanged.
+        belongs_to: Option<DeviceId>,
+    },
+    /// Several tell the number of the first SubDevice of a group: no newcomer among them is taken. Told once.
+    IdentificationShared {
+        /// The first SubDevice of the group.
+        id: DeviceId,
+        /// The number.
+        check: IdentificationCheck,
+        /// How many tell it.
+        count: u16,
+    },
+    /// A hot connect group was plugged in, and all of it are at their targets.
+    GroupJoined {
+        /// Index of the group in the plan.
+        group: usize,
+        /// The port that it hangs at; `None` where that is not known.
+        place: Option<GroupPlace>,
+    },
+    /// A hot connect group does not answer any more.
+    GroupLeft {
+        /// Index of the group in the plan.
+        group: usize,
+    },
+    /// A hot connect group was plugged in at a port where it may not be. It is kept in INIT. Told once.
+    GroupMisplaced {
+        /// Index of the group in the plan.
+        group: usize,
+        /// The port; `None` where that is not known.
+        place: Option<GroupPlace>,
     },
     /// A SubDevice that the plan does not have. It is left alone.
     UnplannedDevice {

@@ -29,5 +29,5 @@ pub use exchange::{Access, DatagramData, ExchangeError, Reply, Request, Target, 
 pub use main_device::{MainDevice, ProbeRequest};
 pub use options::{CounterPoll, Options, Polling, Rounds};
 pub use statistics::Statistics;
-pub use supervisor::{BringUpTimes, DeviceTimes, Phase, StartUpError};
+pub use supervisor::{BringUpTimes, DeviceTimes, GroupPlace, Phase, StartUpError};
 pub use watch::Watch;

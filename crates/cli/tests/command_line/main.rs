@@ -43,6 +43,7 @@ mod gateway;
 mod hints;
 mod host;
 mod hostile;
+mod hot_connect;
 mod inputs;
 mod keeping;
 mod lab;

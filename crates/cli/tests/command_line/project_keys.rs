@@ -39,6 +39,8 @@ fn place(table: &str) -> Option<(&'static str, &'static str)> {
         "ProjectTask" => ("[[task]]\n", ""),
         "Ring" => ("[ring]\n", ""),
         "ProjectDevice" => ("[[device]]\n", ""),
+        "ProjectGroup" => ("[[group]]\n", ""),
+        "IdentificationChoice" => (device!("identification = { "), " }"),
         "Description" => (device!("[device.description]\n"), ""),
         "WatchdogChoice" => (device!("watchdog = { "), " }"),
         "ClockChoice" => (device!("clock = { "), " }"),

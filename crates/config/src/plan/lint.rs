@@ -7,6 +7,8 @@ use linesman_proto::time::Span;
 
 use super::{DevicePlan, IoAt, Plan, Task, reference};
 
+mod hot_connect;
+
 /// Share of the wire's time that cyclic frames should leave to others, in percent.
 const MUCH_LOAD: f64 = 80.0;
 /// Cycles that should fit into a watchdog: one that is lost, one that is late.
@@ -95,6 +97,9 @@ impl Plan {
         self.ethernet_addresses(&mut doubts);
         self.reference(&mut doubts);
         self.units(&mut doubts);
+        self.ports(&mut doubts);
+        self.groups(&mut doubts);
+        self.ring_end(&mut doubts);
         doubts.sort_by_key(|doubt| std::cmp::Reverse(doubt.severity));
         doubts
     }

@@ -6,10 +6,12 @@
 //! counter can be explained and two copies of a frame can be merged. The expected working counter
 //! is never a number here but a function: see [`expect`].
 
+mod cable;
 mod cycle;
 pub mod ethernet;
 mod exchange;
 pub mod expect;
+mod hot_connect;
 pub mod layout;
 pub mod lint;
 pub mod reference;
@@ -36,9 +38,11 @@ use crate::identity::RevisionRule;
 use crate::profile::{DeviceProfile, Mailbox, SyncTimes};
 use crate::start_up::StartUpCommand;
 
+pub use cable::PlannedCable;
 pub use cycle::CycleError;
 pub use exchange::{PlannedCounter, PlannedExchange};
 pub use expect::{PathView, Presence, Served};
+pub use hot_connect::{HotConnectGroup, IdentificationCheck, IdentificationSource};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};
 pub use settings::{
@@ -94,6 +98,8 @@ pub struct Plan {
     pub sync_window: Option<Span>,
     /// Ports whose link was lost stay closed until they are ordered to open (JCT-12).
     pub ports_open_by_order: bool,
+    /// Groups that join and leave while the network runs.
+    pub groups: Vec<HotConnectGroup>,
 }
 
 /// What one SubDevice is set up with.
@@ -184,15 +190,19 @@ impl Plan {
             inputs_shift_ns: None,
             sync_window: None,
             ports_open_by_order: false,
+            groups: Vec::new(),
         }
     }
 
-    /// Whose clock all others follow: the one that was chosen, else the first with a clock that is used.
+    /// Whose clock all others follow: the one that was chosen, else the first with a clock that is used and that
+    /// is not in a group that may be absent, else the first with a clock that is used.
     #[must_use]
     pub fn reference_clock(&self) -> Option<DeviceId> {
         let clocked = || self.devices.iter().filter(|device| device.settings.clock.is_some());
         let chosen = |device: &&DevicePlan| device.settings.clock.is_some_and(|one| one.reference);
-        clocked().find(chosen).or_else(|| clocked().next()).map(|device| device.id)
+        let stays = |device: &&DevicePlan| !self.is_optional(device.id);
+        let first = clocked().find(chosen).or_else(|| clocked().find(stays));
+        first.or_else(|| clocked().next()).map(|device| device.id)
     }
 
     /// The plan of a SubDevice; `None` for an identity that is not of this plan.

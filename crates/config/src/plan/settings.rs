@@ -7,6 +7,8 @@ use linesman_proto::address::StationAlias;
 use linesman_proto::time::Span;
 use serde::{Deserialize, Serialize};
 
+use super::IdentificationCheck;
+
 /// Choices for one SubDevice.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct DeviceSettings {
@@ -22,6 +24,8 @@ pub struct DeviceSettings {
     pub addressing: AddressingChoice,
     /// Its second address, the station alias of its EEPROM; [`AddressingChoice::Alias`] needs it.
     pub alias: Option<StationAlias>,
+    /// The number that it must tell; `None`: it is not told apart from its equals.
+    pub identification: Option<IdentificationCheck>,
     /// Its watchdogs.
     pub watchdog: WatchdogSettings,
     /// Its distributed clock; `None` runs free.

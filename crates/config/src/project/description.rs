@@ -3,8 +3,8 @@
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::PortMap;
-use linesman_proto::register::SmControl;
-use linesman_proto::sii::{Direction, FmmuUsage, MailboxPair, PortKind, Protocols};
+use linesman_proto::register::{AL_STATUS_CODE, SmControl};
+use linesman_proto::sii::{Direction, FmmuUsage, Identification, MailboxPair, PortKind, Protocols};
 use serde::{Deserialize, Serialize};
 
 use crate::esi::device::{letters, physics};
@@ -30,6 +30,9 @@ pub struct Description {
     /// Its AL status mirrors AL control: it has no firmware.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub emulation: bool,
+    /// Where the number of its selector is read: 0x0134 through AL control, else a word of memory.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub identification_register: Option<u16>,
     /// Bits of outputs, where no SyncManagers are listed.
     #[serde(skip_serializing_if = "is_zero")]
     pub outputs_bits: u16,
@@ -216,6 +219,11 @@ impl Description {
             }),
             no_lrw: profile.no_lrw,
             emulation: profile.device_emulation,
+            identification_register: match profile.identification {
+                Identification::None => None,
+                Identification::AlStatus => Some(AL_STATUS_CODE.address.0),
+                Identification::Memory(at) => Some(at.0),
+            },
             outputs_bits: 0,
             inputs_bits: 0,
             fmmus: profile.fmmus.iter().map(word).collect(),
@@ -265,6 +273,11 @@ impl Description {
             mailbox: self.mailbox.as_ref().map(DescribedMailbox::mailbox).transpose()?,
             no_lrw: self.no_lrw,
             device_emulation: self.emulation,
+            identification: match self.identification_register {
+                None => Identification::None,
+                Some(at) if at == AL_STATUS_CODE.address.0 => Identification::AlStatus,
+                Some(at) => Identification::Memory(RegisterAddress(at)),
+            },
             ebus_current_ma: self.ebus_current_ma,
             ports: self.ports.as_deref().map(ports).transpose()?,
             fmmus: self.usages(),

@@ -10,7 +10,8 @@ use linesman_proto::state::AlState;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ClockChoice, Description, Mapping, ProjectError, StartUpEntry, WatchdogChoice, inline, quoted,
+    ClockChoice, Description, IdentificationChoice, Mapping, ProjectError, StartUpEntry,
+    WatchdogChoice, inline, quoted,
 };
 use crate::attachment::Attachment;
 use crate::compare::Wanted;
@@ -48,6 +49,9 @@ pub struct ProjectDevice {
     /// Station alias, as its EEPROM holds it: tells twins apart. Not compared when absent.
     #[serde(default)]
     pub alias: Option<u16>,
+    /// The number by which it is told apart from its equals; not compared when absent.
+    #[serde(default)]
+    pub identification: Option<IdentificationChoice>,
     /// Whose port it hangs on: `maindevice` or a device's name and port.
     pub on: Attachment,
     /// The port by which it is entered, `A` unless said.
@@ -138,6 +142,7 @@ impl ProjectDevice {
             revision_rule: None,
             serial: None,
             alias: None,
+            identification: None,
             on,
             entry: port_a(),
             station: None,
@@ -243,6 +248,7 @@ impl ProjectDevice {
                 let _ = writeln!(text, "{key} = {value}");
             }
         };
+        choice("identification", self.identification.as_ref().map(inline));
         choice("state", self.state.as_ref().map(inline));
         choice("task", self.task.as_ref().map(inline));
         choice("sync_unit", self.sync_unit.as_ref().map(inline));
@@ -274,7 +280,7 @@ impl ProjectDevice {
 }
 
 /// The keys of a table, each on one line with all that is in it.
-fn inline_lines<T: Serialize>(value: &T) -> String {
+pub(super) fn inline_lines<T: Serialize>(value: &T) -> String {
     let Ok(toml::Value::Table(table)) = toml::Value::try_from(value) else { return String::new() };
     let lines: Vec<String> = table.iter().map(|(key, value)| format!("{key} = {value}")).collect();
     lines.join("\n")

@@ -20,6 +20,7 @@ mod description;
 mod device;
 pub mod ethernet;
 mod from_esi;
+mod group;
 mod resolve;
 
 use std::collections::BTreeMap;
@@ -40,6 +41,7 @@ pub use description::{
 };
 pub use device::ProjectDevice;
 pub use ethernet::EthernetChoice;
+pub use group::{IdentificationChoice, IdentificationWay, ProjectGroup};
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
 
 /// A project.
@@ -62,6 +64,9 @@ pub struct Project {
     /// Its SubDevices, in the order of their numbers.
     #[serde(default, rename = "device")]
     pub devices: Vec<ProjectDevice>,
+    /// Devices that are plugged in and out together while the network runs.
+    #[serde(default, rename = "group")]
+    pub groups: Vec<ProjectGroup>,
     /// Where a second card closes a ring, if it does.
     #[serde(default)]
     pub ring: Option<Ring>,
@@ -141,6 +146,7 @@ impl Project {
             toml::from_str(text).map_err(|error| ProjectError::Form(error.to_string()))?;
         project.tree()?;
         project.check()?;
+        project.check_groups(text)?;
         Ok(project)
     }
 
@@ -183,7 +189,8 @@ impl Project {
     #[must_use]
     pub fn of(name: &str, devices: Vec<ProjectDevice>) -> Self {
         let (esi, network, tasks, ring) = (Vec::new(), Network::default(), Vec::new(), None);
-        Self { name: name.to_owned(), esi, network, tasks, devices, ring }
+        let groups = Vec::new();
+        Self { name: name.to_owned(), esi, network, tasks, devices, groups, ring }
     }
 
     /// Whether it says more than who is where, and what that is: tasks, settings, descriptions of makers.
@@ -191,6 +198,7 @@ impl Project {
     pub fn chooses(&self) -> bool {
         !self.esi.is_empty()
             || !self.tasks.is_empty()
+            || !self.groups.is_empty()
             || self.network != Network::default()
             || self.devices.iter().any(ProjectDevice::chooses)
     }
@@ -335,6 +343,9 @@ impl Project {
         }
         for device in &self.devices {
             device.write(&mut text);
+        }
+        for group in &self.groups {
+            let _ = writeln!(text, "\n[[group]]\n{}", device::inline_lines(group));
         }
         text
     }

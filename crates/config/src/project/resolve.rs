@@ -13,7 +13,9 @@ use super::{Project, ProjectDevice, ProjectError};
 use crate::esi::value;
 use crate::identity::RevisionRule;
 use crate::plan::layout::PlanOptions;
-use crate::plan::{AutomaticActions, DeviceSettings, Plan, PlanError, PlannedDevice};
+use crate::plan::{
+    AutomaticActions, DeviceSettings, IdentificationSource, Plan, PlanError, PlannedDevice,
+};
 use crate::profile::{DeviceProfile, MappedEntry, MappedPdo};
 use crate::start_up::{StartUpAction, StartUpCommand, Transition};
 
@@ -128,7 +130,8 @@ impl Project {
             let planned = self.planned(device, place, known);
             devices.push(planned.map_err(wrong)?);
         }
-        let options = self.network.options(&self.tasks);
+        let mut options = self.network.options(&self.tasks);
+        options.groups = self.planned_groups(&tree, &places);
         Ok(Resolved { devices, tree: tree.in_processing_order(), options, places })
     }
 
@@ -167,13 +170,23 @@ impl Project {
         start_up.extend(device.start_up.iter().filter_map(command));
         let clock = device.clock.as_ref();
         let clock = clock.map(|one| one.settings(&profile.clock_modes, self.cycle_of(device)));
+        let identification = self.identification_of(device);
+        let identification = identification
+            .map(|choice| choice.planned(device, profile.identification))
+            .transpose()?;
+        // The number that a source of the EEPROM must tell, once more where that source is looked for.
+        let of =
+            |source| identification.filter(|check| check.source == source).map(|check| check.value);
+        let alias = device.alias.or(of(IdentificationSource::Alias).map(|value| value as u16));
+        let serial = device.serial.or(of(IdentificationSource::Serial));
         let settings = DeviceSettings {
             task: device.task.clone(),
             sync_unit: device.sync_unit.clone(),
             access: device.access.unwrap_or(self.network.access),
             frame_repeat: device.frame_repeat.unwrap_or(frame_repeat),
             addressing: device.addressing,
-            alias: device.alias.map(StationAlias),
+            alias: alias.map(StationAlias),
+            identification,
             watchdog: device.watchdog.settings(),
             clock: clock.transpose()?,
             on_wrong_counter: device.on_wrong_counter.unwrap_or(self.network.on_wrong_counter),
@@ -193,7 +206,7 @@ impl Project {
                 vendor_id: device.vendor_id.unwrap_or(vendor),
                 product_code: device.product_code.unwrap_or(product),
                 revision: device.revision.unwrap_or(revision),
-                serial_number: device.serial.unwrap_or(0),
+                serial_number: serial.unwrap_or(0),
             },
             revision_rule: match device.revision {
                 Some(_) => device.revision_rule.or(revision_rule).unwrap_or_default(),

@@ -3,6 +3,7 @@
 mod background_poll;
 mod bisect;
 mod fast_poll;
+mod hot_connect;
 mod intake;
 mod network_watch;
 mod setup;
@@ -334,6 +335,7 @@ impl Engine {
             for rule in RULES {
                 (rule.judge)(&view, &mut watched.conditions);
             }
+            hot_connect::excuse(&watched.model, &mut watched.conditions);
             let is_curious = is_active && (watched.bisect.is_some() || watched.lacks_controls());
             let is_watched = (watched.is_watched(now) || is_curious) && !has_ended;
             // A search waits for a moment after each step, whatever comes back.

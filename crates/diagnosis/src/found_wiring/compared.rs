@@ -89,6 +89,7 @@ impl<'a> FoundWiring<'a> {
             Side { tree: self.planned, nodes: &self.wanted },
             Side { tree: &self.tree, nodes: &self.there },
         )
+        .without_groups(|node| self.model.optional.contains_key(&DeviceId(node as u32)))
     }
 
     /// The cheap answer for a line that is well.

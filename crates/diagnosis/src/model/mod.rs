@@ -28,7 +28,7 @@ pub mod traffic;
 pub mod up_time;
 pub mod working_counter;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use linesman_config::inventory::label;
 use linesman_config::plan::PlannedExchange;
@@ -119,6 +119,8 @@ pub struct NetworkModel {
     pub tree: Option<Tree>,
     /// Whether the tree comes from a project or an observation file, not from what was seen.
     pub tree_is_planned: bool,
+    /// Controllers of hot connect groups that may be absent, each with the first one of its group.
+    pub optional: BTreeMap<DeviceId, DeviceId>,
     /// Whether this program drives the line, so that no order to a SubDevice goes unseen.
     pub sees_all_orders: bool,
     /// Process data that were planned: working counters that are expected from the start.
@@ -198,7 +200,10 @@ impl NetworkModel {
         let devices = devices.collect();
         let tree = project.tree().ok();
         let tree_is_planned = tree.is_some();
-        Self { network, devices, tree, tree_is_planned, ..Self::default() }
+        let optional = project.optional_devices().into_iter();
+        let optional = optional.map(|(of, first)| (DeviceId(of as u32), DeviceId(first as u32)));
+        let optional = optional.collect();
+        Self { network, devices, tree, tree_is_planned, optional, ..Self::default() }
     }
 
     /// Takes the process data that were planned: who has which FMMU, and the working counter of each datagram.

@@ -1,5 +1,6 @@
 //! Events in words: what is written to a log or a terminal.
 
+use linesman_config::plan::IdentificationCheck;
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::AlStatus;
 use linesman_proto::state::{AlState, AlStatusCode};
@@ -104,6 +105,16 @@ impl Event {
                 name(*id),
                 alias.0
             )],
+            Self::WrongIdentification { id, check, found, belongs_to } => {
+                vec![wrong_identification(&name, *id, *check, *found, *belongs_to)]
+            }
+            Self::IdentificationShared { id, check, count } => vec![format!(
+                "{}: {count} SubDevices tell its number {} ({}): none that is new is taken. Do: give each a number of \
+                 its own, at its selector or with `linesman sii WHERE DEVICE alias N`",
+                name(*id),
+                check.value,
+                check.source
+            )],
             Self::UnplannedDevice { position, found } => {
                 let found = linesman_config::identity::text(found);
                 vec![format!("position {position}: a device that is not planned ({found})")]
@@ -123,6 +134,9 @@ impl Event {
             | Self::Identified { .. }
             | Self::Links { .. }
             | Self::PortOpened { .. }
+            | Self::GroupJoined { .. }
+            | Self::GroupLeft { .. }
+            | Self::GroupMisplaced { .. }
             | Self::ClockDifference { .. }
             | Self::NetworkTime { .. }
             | Self::WorkingCounter { .. }
@@ -140,6 +154,30 @@ impl Event {
             | Self::Stopped => Vec::new(),
         }
     }
+}
+
+/// Who tells another number than planned, and what to do.
+fn wrong_identification(
+    name: &impl Fn(DeviceId) -> String,
+    id: DeviceId,
+    check: IdentificationCheck,
+    found: Option<u32>,
+    belongs_to: Option<DeviceId>,
+) -> String {
+    let IdentificationCheck { source, value, compulsory } = check;
+    let then = if compulsory { "it is kept in INIT" } else { "it is driven all the same" };
+    let told = match (found, belongs_to) {
+        (None, _) => "it tells none".to_owned(),
+        (Some(found), None) => format!("found {found}"),
+        (Some(found), Some(owner)) => {
+            format!("found {found}, that of {}: they may be exchanged", name(owner))
+        }
+    };
+    let action = match belongs_to {
+        Some(_) => "plug each in at its own place, or exchange their numbers",
+        None => "set the number at the device, or change `identification` in the project",
+    };
+    format!("{}: its {source} must be {value}, {told}; {then}. Do: {action}", name(id))
 }
 
 /// What to do about a start-up command that the SubDevice refuses.

@@ -4,6 +4,7 @@
 pub mod address;
 pub mod clock;
 pub mod counters;
+pub(crate) mod identification;
 pub mod read_only_scan;
 pub mod scan;
 pub mod set_up;

@@ -119,7 +119,8 @@ impl SubDeviceSupervisor<'_> {
         let lost_before = device_table.losses(self.device.id) > 0;
         let asked = device_table.requests(self.device.id) > self.requests_at_loss;
         let may = self.context.options.reinitialise && self.device.settings.keeping.reinitialise;
-        !lost_before || asked || may
+        // A group that joins is brought up, whatever is wanted of those that should always be there.
+        !lost_before || asked || may || device_table.groups.is_optional(self.device.id)
     }
 
     /// Drives and watches until the SubDevice is lost.
@@ -260,8 +261,16 @@ impl SubDeviceSupervisor<'_> {
         device_table.set_reached(id, state);
         let all = device_table.have_all_reached()
             && device_table.set_all_reached(self.context.wire.now());
+        let group = device_table.groups.group_of(id).filter(|group| {
+            let members = &self.context.plan.groups[*group].members;
+            members.iter().all(|member| device_table.has_reached(*member))
+        });
+        let joined = group.and_then(|group| Some((group, device_table.groups.join(group)?)));
         drop(device_table);
         self.context.wire.emit(Event::TargetReached { id, state });
+        if let Some((group, place)) = joined {
+            self.context.wire.emit(Event::GroupJoined { group, place });
+        }
         if all {
             self.context.wire.emit(Event::AllReached);
         }

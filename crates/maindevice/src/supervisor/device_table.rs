@@ -2,11 +2,9 @@
 //! by the supervisors, which fill it.
 
 use std::collections::BTreeSet;
-use std::future::Future;
-use std::pin::Pin;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex};
-use std::task::{Context, Poll, Waker};
+use std::task::Waker;
 
 use linesman_config::plan::expect::{Presence, Served};
 use linesman_config::plan::{DevicePlan, Plan};
@@ -15,10 +13,9 @@ use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, OredStates};
 use linesman_proto::time::{DcTime, Instant, Span};
 
+use super::group_table::GroupTable;
 use super::times::{BringUpTimes, Phase};
-use crate::executor::lock;
 use crate::executor::waitlist::Waitlist;
-use crate::executor::wire::Sleep;
 
 /// Whether and how a SubDevice can be reached.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -98,13 +95,16 @@ pub(crate) struct DeviceTable {
     devices: Vec<DeviceEntry>,
     /// Shared, so that the cycle sees without a lock whether anything has changed.
     version: Arc<AtomicU64>,
-    alerts: u64,
+    pub(super) alerts: u64,
     /// Sleeps that an alert ends, in the order in which they began.
-    waiting: Waitlist<Waker>,
+    pub(super) waiting: Waitlist<Waker>,
     /// Devices whose presence has changed since [`DeviceTable::take_changes`].
     changed: Vec<DeviceId>,
     /// How many are at their targets.
     reached: usize,
+    /// How many are not there, and need not be.
+    excused: usize,
+    pub(super) groups: GroupTable,
     responding: Option<WorkingCounter>,
     states: Option<OredStates>,
     all_reached: bool,
@@ -140,7 +140,8 @@ impl DeviceTable {
         let times = Some(BringUpTimes::new(count));
         let stations = plan.devices.iter().map(|device| device.station).collect();
         let is_ring = plan.tree.closes_at().is_some();
-        Self { devices, changed, times, stations, is_ring, ..Self::default() }
+        let groups = GroupTable::new(plan);
+        Self { devices, changed, times, stations, is_ring, groups, ..Self::default() }
     }
 
     /// Changes whenever presence or "settled" changes.
@@ -218,6 +219,10 @@ impl DeviceTable {
             ..DeviceEntry::default()
         };
         *live = new;
+        if self.groups.is_optional(id) {
+            self.excused += usize::from(found == Reachability::Lost);
+            self.excused -= usize::from(before == Reachability::Lost);
+        }
         self.set_at_target(id, false);
         before
     }
@@ -255,9 +260,9 @@ impl DeviceTable {
         self.reached = self.reached + usize::from(reached) - usize::from(before);
     }
 
-    /// Whether all are where they shall be.
+    /// Whether all are where they shall be, but for those that may be absent and are.
     pub(crate) fn have_all_reached(&self) -> bool {
-        self.reached == self.devices.len()
+        self.reached + self.excused == self.devices.len()
     }
 
     fn changes(&mut self, id: DeviceId) {
@@ -380,6 +385,14 @@ impl DeviceTable {
         (0..self.devices.len() as u32).map(|id| self.wanted(DeviceId(id))).collect()
     }
 
+    /// The states of those that should be there.
+    pub(crate) fn all_expected(&self) -> Vec<AlState> {
+        let is_excused =
+            |id: &DeviceId| self.groups.is_optional(*id) && self.found(*id) == Reachability::Lost;
+        let all = (0..self.devices.len() as u32).map(DeviceId);
+        all.filter(|id| !is_excused(id)).map(|id| self.wanted(id)).collect()
+    }
+
     /// Asks for a state of a SubDevice, whatever the plan says. False when there is no such SubDevice.
     pub(crate) fn ask_for(&mut self, id: DeviceId, state: AlState) -> bool {
         let Some(live) = self.live(id) else { return false };
@@ -489,42 +502,5 @@ impl DeviceTable {
 
     pub(crate) fn alerts(&self) -> u64 {
         self.alerts
-    }
-}
-
-/// Sleeps, but no longer than until the next alert.
-pub(crate) struct AlertSleep {
-    pub(crate) device_table: Arc<Mutex<DeviceTable>>,
-    /// The last alert that was acted upon.
-    pub(crate) seen: u64,
-    pub(crate) sleep: Sleep,
-    /// Its place among those that wait.
-    pub(crate) place: Option<u64>,
-}
-
-impl Future for AlertSleep {
-    type Output = ();
-
-    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
-        let mut device_table = lock(&self.device_table);
-        if device_table.alerts != self.seen {
-            return Poll::Ready(());
-        }
-        if self.place.is_none() {
-            let place = device_table.waiting.insert(context.waker().clone());
-            drop(device_table);
-            self.place = Some(place);
-        } else {
-            drop(device_table);
-        }
-        Pin::new(&mut self.sleep).poll(context)
-    }
-}
-
-impl Drop for AlertSleep {
-    fn drop(&mut self) {
-        if let Some(place) = self.place {
-            lock(&self.device_table).waiting.remove(place);
-        }
     }
 }

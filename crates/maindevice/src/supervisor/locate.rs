@@ -15,6 +15,8 @@ use linesman_proto::state::AlState;
 
 use super::align::align;
 use super::by_alias;
+use super::hot_connect;
+use super::numbers::Numbers;
 use super::times::Phase;
 use super::{Context, Reachability, find, lose};
 use crate::event::Event;
@@ -26,14 +28,18 @@ use crate::procedure::{address, sii};
 
 /// One controller on the line.
 #[derive(Clone, Copy)]
-struct FoundController {
-    position: Position,
+pub(super) struct FoundController {
+    pub(super) position: Position,
     /// How it is addressed as long as it has no station address.
-    place: Target,
+    pub(super) place: Target,
+    /// The station address that it has; 0 for none.
+    pub(super) station: StationAddress,
     /// Which of the plan, if its address tells.
-    known: Option<DeviceId>,
-    /// Who it is, where a scan has asked it a moment ago.
-    identity: Option<Identity>,
+    pub(super) known: Option<DeviceId>,
+    /// Who it is, where that was asked a moment ago.
+    pub(super) identity: Option<Identity>,
+    /// It was found by its alias: it is no landmark, since it may be anywhere.
+    pub(super) by_alias: bool,
 }
 
 /// Looks for all, whatever addresses they have. Who a scan has identified a moment ago is known by the
@@ -63,6 +69,7 @@ async fn locate(
 ) -> Result<(), ReadOnlyScanError> {
     let wire = &context.wire;
     let began = wire.now();
+    lock(&context.device_table).groups.begin_search();
     let (places, _) = read_only_scan::places(wire, context.network).await?;
     let mut who = vec![None; places.len()];
     if let Some(scan_cache) = scan_cache {
@@ -91,9 +98,10 @@ async fn locate(
     let devices = context.plan.devices.iter().rev();
     let planned: BTreeMap<StationAddress, DeviceId> = devices
         .filter(|device| device.settings.addressing == AddressingChoice::Auto)
+        // Groups may be anywhere, too.
+        .filter(|device| context.plan.group_of(device.id).is_none())
         .map(|device| (device.station, device.id))
         .collect();
-    // Those that were found by their alias are no landmarks: they may be anywhere.
     let anywhere: BTreeSet<StationAddress> = (context.plan.devices.iter())
         .filter(|device| by_alias::alias_of(device).is_some())
         .map(|device| device.station)
@@ -104,15 +112,19 @@ async fn locate(
         planned.filter(|_| unique && station.0 != 0 && !from_scratch)
     };
     let seen: Vec<FoundController> = (stations.iter().zip(places).zip(who).zip(0..))
-        .filter(|(((station, _), _), _)| !anywhere.contains(station))
         .map(|(((station, place), identity), at)| FoundController {
             position: Position(at),
             place,
+            station: *station,
             known: known(*station),
             identity,
+            by_alias: anywhere.contains(station),
         })
         .collect();
+    let (groups, mut seen) = hot_connect::claim(context, seen).await;
+    seen.retain(|one| !one.by_alias);
     match_stretches(context, &seen).await;
+    hot_connect::settle(context, groups).await;
     for device in &context.plan.devices {
         if lock(&context.device_table).found(device.id) == Reachability::Unknown {
             lose(context, device.id);
@@ -132,8 +144,10 @@ async fn match_stretches(context: &Context, seen: &[FoundController]) {
         }
         let end_planned = landmark.flatten().map_or(context.plan.devices.len(), DeviceId::index);
         if first_planned <= end_planned {
-            let planned = first_planned..end_planned;
-            stretch(context, &seen[first_seen..end], planned).await;
+            let planned = &context.plan.devices[first_planned..end_planned];
+            let fixed = planned.iter().filter(|one| context.plan.group_of(one.id).is_none());
+            let fixed = fixed.map(|device| device.id).collect();
+            stretch(context, &seen[first_seen..end], fixed).await;
             first_planned = end_planned + 1;
         }
         first_seen = end + 1;
@@ -161,41 +175,54 @@ async fn stations(wire: &Wire, places: &[Target]) -> Vec<StationAddress> {
     stations
 }
 
+/// Asks those who they are of whom nothing is known.
+pub(super) async fn identify(context: &Context, seen: &mut [FoundController]) {
+    let is_asked = |one: &FoundController| one.known.is_none() && one.identity.is_none();
+    let reading: Vec<_> = (seen.iter())
+        .map(|one| {
+            let (wire, place) = (context.wire.clone(), one.place);
+            let read = async move { sii::read_identity(&wire, place).await };
+            is_asked(one).then(|| context.wire.spawn(read))
+        })
+        .collect();
+    for (one, reading) in seen.iter_mut().zip(reading) {
+        if let Some(reading) = reading {
+            // Who cannot say who it is fits nobody.
+            one.identity = Some(reading.await.unwrap_or_default());
+        }
+    }
+}
+
 /// Identifies unknown controllers, of which the plan has these.
-async fn stretch(context: &Context, seen: &[FoundController], planned: std::ops::Range<usize>) {
-    let planned: Vec<DeviceId> = (context.plan.devices[planned].iter())
-        .filter(|device| by_alias::alias_of(device).is_none())
-        .map(|device| device.id)
+pub(super) async fn stretch(context: &Context, seen: &[FoundController], planned: Vec<DeviceId>) {
+    let planned: Vec<DeviceId> = (planned.into_iter())
+        .filter(|id| by_alias::alias_of(&context.plan.devices[id.index()]).is_none())
         .filter(|id| !matches!(lock(&context.device_table).found(*id), Reachability::There { .. }))
         .collect();
     if seen.is_empty() {
         return;
     }
-    let reading: Vec<_> = (seen.iter())
-        .map(|seen| {
-            let (wire, FoundController { place, identity, .. }) = (context.wire.clone(), *seen);
-            context.wire.spawn(async move {
-                match identity {
-                    Some(identity) => Ok(identity),
-                    None => sii::read_identity(&wire, place).await,
-                }
-            })
-        })
-        .collect();
-    let mut identities = Vec::with_capacity(reading.len());
-    for reading in reading {
-        // Who cannot say who it is fits nobody.
-        identities.push(reading.await.unwrap_or_default());
-    }
+    let mut seen = seen.to_vec();
+    identify(context, &mut seen).await;
+    let identities: Vec<Identity> =
+        seen.iter().map(|one| one.identity.unwrap_or_default()).collect();
     let differs = |id: DeviceId, found: &Identity| {
         let device = &context.plan.devices[id.index()];
         let anyone = device.identity == Identity::default();
         mismatch(&device.identity, found, device.revision_rule).filter(|_| !anyone)
     };
+    let fits = |at: usize, of: usize| differs(planned[of], &identities[at]).is_none();
+    let numbers = Numbers::read(context, &seen, &planned).await;
     let pairs: Vec<(usize, usize)> = if seen.len() == planned.len() {
         (0..seen.len()).map(|at| (at, at)).collect()
     } else {
-        align(seen.len(), planned.len(), |at, of| differs(planned[of], &identities[at]).is_none())
+        let tells = |at: usize, of: usize| numbers.wrong(at, planned[of]).is_none();
+        let by_number = align(seen.len(), planned.len(), |at, of| fits(at, of) && tells(at, of));
+        // Numbers that contradict the places are those of SubDevices that were exchanged.
+        match numbers.contradict(&by_number, &planned) {
+            false => by_number,
+            true => align(seen.len(), planned.len(), fits),
+        }
     };
     let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     for (at, found) in identities.iter().enumerate() {
@@ -210,6 +237,7 @@ async fn stretch(context: &Context, seen: &[FoundController], planned: std::ops:
     for (at, of) in pairs {
         let (id, found) = (planned[of], identities[at]);
         match differs(id, &found) {
+            None if numbers.refuses(context, &seen[at], at, id).await => {}
             None => {
                 context.wire.emit(Event::Identified { id, found });
                 let (context, place) = (context.clone(), seen[at].place);

@@ -13,7 +13,7 @@
 //! Reference: S4, "Reconnection"; S2 2.4.1 (0x0101, loop mode "auto close": opened again by writing it).
 
 use linesman_config::plan::{DevicePlan, Plan};
-use linesman_proto::address::RegisterAddress;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::port::Port;
 use linesman_proto::register::{self, DlControl, DlStatus, EcatEvents, LoopMode};
 use linesman_proto::time::Span;
@@ -157,6 +157,10 @@ fn is_prepared(context: &Context, device: &DevicePlan, port: Port) -> bool {
     else {
         return false;
     };
+    // Groups come and go: what is plugged in there may be another one, or be there already elsewhere.
+    if context.plan.group_of(DeviceId(first as u32)).is_some() {
+        return true;
+    }
     let is_behind = |node: usize| node == first || tree.is_downstream_of(node, first);
     let mut section = context.plan.devices.iter().filter(|other| is_behind(other.id.index()));
     let device_table = lock(&context.device_table);

@@ -5,15 +5,19 @@
 //! out; [`supervise`] starts them and looks for those that are lost. [`mod@device_table`] is what they know,
 //! [`rounds`] finds out for all of them at once where they do not read by themselves.
 
+mod alert_sleep;
 mod align;
 mod by_alias;
 mod clocks;
 pub(crate) mod counters;
 pub(crate) mod device_supervisor;
 pub(crate) mod device_table;
+mod group_table;
+mod hot_connect;
 mod locate;
 pub(crate) mod loop_control;
 mod modules;
+mod numbers;
 mod open_ring;
 mod rounds;
 mod shortest_cycle;
@@ -25,7 +29,7 @@ mod watched_clock;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
-use linesman_config::plan::{AddressingChoice, DevicePlan, Plan};
+use linesman_config::plan::{AddressingChoice, DevicePlan, HotConnectGroup, Plan};
 use linesman_proto::address::{DeviceId, Network, WorkingCounter};
 use linesman_proto::register;
 use linesman_proto::time::{Instant, Span};
@@ -37,7 +41,9 @@ use crate::options::{Options, Polling};
 use crate::procedure::read_only_scan::AL_LEN;
 use crate::procedure::scan::ScanCache;
 
-pub(crate) use device_table::{AlertSleep, DeviceTable, Reachability, ReferenceClock};
+pub(crate) use alert_sleep::AlertSleep;
+pub(crate) use device_table::{DeviceTable, Reachability, ReferenceClock};
+pub use group_table::GroupPlace;
 pub use start_up::StartUpError;
 pub use times::{BringUpTimes, DeviceTimes, Phase};
 
@@ -86,7 +92,9 @@ impl Context {
 
     /// Whether all that is left to do is to exchange process data.
     fn is_left_alone(&self) -> bool {
-        self.options.polling == Polling::Nothing && lock(&self.device_table).all_have_been_reached()
+        self.options.polling == Polling::Nothing
+            && self.plan.groups.is_empty()
+            && lock(&self.device_table).all_have_been_reached()
     }
 }
 
@@ -129,7 +137,7 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
         context.wire.spawn(rounds::make(context.clone(), rounds));
     }
     let mut thorough_at = context.wire.now() + THOROUGH_INTERVAL;
-    let (mut located_at, mut placed_at) = (None, None);
+    let (mut located_at, mut placed_at, mut losses) = (None, None, 0);
     while !context.is_left_alone() {
         let seen = context.alerts();
         context.until_search(seen).await;
@@ -149,11 +157,14 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
             continue;
         }
         let now = context.wire.now();
-        if responding != located_at || now >= thorough_at {
+        // A group that went and came between two looks counts as many as before.
+        let lost_groups = lock(&context.device_table).groups.losses();
+        let has_changed = responding != located_at || lost_groups != losses;
+        if has_changed || now >= thorough_at {
             thorough_at = now + THOROUGH_INTERVAL;
             // A silent line is found out by the supervisors; the next round tries again.
             if locate::again(&context).await.is_ok() {
-                located_at = responding;
+                (located_at, losses) = (responding, lost_groups);
             }
         }
     }
@@ -173,7 +184,7 @@ async fn search(context: &Context) -> bool {
     by_alias::locate(context).await;
     let lost: Vec<_> = (context.plan.devices.iter())
         .filter(|device| lock(&context.device_table).found(device.id) == Reachability::Lost)
-        .filter(|device| !is_by_place(device))
+        .filter(|device| !is_by_place(device) && !is_by_number(context, device))
         .collect();
     let asked: Vec<_> = (lost.iter())
         .map(|device| {
@@ -185,7 +196,8 @@ async fn search(context: &Context) -> bool {
         .collect();
     let is_lost =
         |device: &DevicePlan| lock(&context.device_table).found(device.id) == Reachability::Lost;
-    let mut missing = context.plan.devices.iter().any(|one| is_by_place(one) && is_lost(one));
+    let is_sought = |one: &DevicePlan| is_by_place(one) || is_by_number(context, one);
+    let mut missing = context.plan.devices.iter().any(|one| is_sought(one) && is_lost(one));
     for (id, reply) in asked {
         match reply.await {
             Ok(reply) if reply.wkc.0 == 1 => find(context, id, false),
@@ -200,12 +212,37 @@ fn is_by_place(device: &DevicePlan) -> bool {
     device.settings.addressing == AddressingChoice::Position
 }
 
+/// Whether a SubDevice is taken by the number of its group only: its group is not there, and who answers at its
+/// station address may be another one.
+fn is_by_number(context: &Context, device: &DevicePlan) -> bool {
+    let first = context.plan.group_of(device.id).map(HotConnectGroup::first);
+    let found = |id| lock(&context.device_table).found(id);
+    first.is_some_and(|first| !matches!(found(first), Reachability::There { .. }))
+}
+
 /// A SubDevice does not answer.
 pub(crate) fn lose(context: &Context, id: DeviceId) {
-    let before = lock(&context.device_table).set_found(id, Reachability::Lost);
-    if before != Reachability::Lost {
+    let mut device_table = lock(&context.device_table);
+    let before = device_table.set_found(id, Reachability::Lost);
+    if before == Reachability::Lost {
+        return;
+    }
+    // Who may be absent, and never was there, is not missed.
+    let is_missed = before != Reachability::Unknown || !device_table.groups.is_optional(id);
+    let group = device_table.groups.group_of(id);
+    let is_first = |group: &usize| context.plan.groups[*group].first() == id;
+    let left = group.filter(is_first).filter(|group| device_table.groups.leave(*group));
+    device_table.alert();
+    let all = device_table.have_all_reached() && device_table.set_all_reached(context.wire.now());
+    drop(device_table);
+    if is_missed {
         context.wire.emit(Event::DeviceLost { id });
-        lock(&context.device_table).alert();
+    }
+    if let Some(group) = left {
+        context.wire.emit(Event::GroupLeft { group });
+    }
+    if all {
+        context.wire.emit(Event::AllReached);
     }
 }
 

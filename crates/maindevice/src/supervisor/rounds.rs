@@ -28,7 +28,7 @@ pub(super) async fn make(context: Context, rounds: Rounds) {
         context.wire.sleep(context.options.watch_interval).await;
         let status = register::AL_STATUS;
         let read = context.wire.read(Target::All, status.address, status.len).await;
-        let wanted = lock(&context.device_table).all_wanted();
+        let wanted = lock(&context.device_table).all_expected();
         if !read.is_ok_and(|reply| is_as_wanted(&reply, &wanted)) {
             context.bad_rounds.fetch_add(1, Ordering::Relaxed);
             lock(&context.device_table).alert();

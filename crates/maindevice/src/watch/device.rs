@@ -9,6 +9,7 @@ use linesman_proto::register::{AlStatus, DlStatus};
 use linesman_proto::sii::Identity;
 use linesman_proto::state::{AlState, AlStatusCode, DeviceState, StateValue};
 use linesman_proto::time::{Instant, Span};
+use linesman_proto::topology::End;
 
 use super::CounterTotals;
 use crate::event::Event;
@@ -35,6 +36,10 @@ pub struct WatchedDevice {
     id: DeviceId,
     /// Which ports have a neighbour in the plan.
     planned: PortMap<bool>,
+    /// Ports at which a hot connect group may come and go.
+    changeable: PortMap<bool>,
+    /// It may be absent.
+    optional: bool,
     present: Option<bool>,
     status: Option<AlStatus>,
     code: AlStatusCode,
@@ -58,6 +63,8 @@ impl WatchedDevice {
         Self {
             id: device.id,
             planned: PortMap::from_fn(is_planned),
+            changeable: PortMap::from_fn(|port| is_changeable(plan, node, port)),
+            optional: plan.is_optional(device.id),
             present: None,
             status: None,
             code: AlStatusCode::NO_ERROR,
@@ -124,6 +131,7 @@ impl WatchedDevice {
             let seen = links.port_state(port);
             let planned = self.planned[port];
             let bits = match (planned, seen.link, seen.communication) {
+                (true, false, _) | (false, _, true) if self.changeable[port] => continue,
                 (true, false, _) => DeviceState::MISSING_LINK,
                 (true, true, false) => DeviceState::LINK_ERROR,
                 (false, _, true) => DeviceState::ADDITIONAL_LINK,
@@ -140,8 +148,16 @@ impl WatchedDevice {
         self.code
     }
 
-    /// Whether it signals an error, is not there, or is somebody else.
+    /// Whether it is absent, and may be.
+    pub(super) fn is_excused(&self) -> bool {
+        self.optional && self.present != Some(true) && !self.wrong_identity
+    }
+
+    /// Whether it signals an error, is not there although it should be, or is somebody else.
     pub(super) fn has_error(&self) -> bool {
+        if self.is_excused() {
+            return false;
+        }
         let faults = [
             DeviceState::ERROR,
             DeviceState::WRONG_IDENTITY,
@@ -252,6 +268,7 @@ impl WatchedDevice {
                 self.found = Some(*found);
                 self.wrong_identity = true;
             }
+            Event::WrongIdentification { check, .. } => self.wrong_identity = check.compulsory,
             Event::Links { status, .. } => {
                 self.present = Some(true);
                 self.links = Some(*status);
@@ -277,6 +294,17 @@ impl WatchedDevice {
     }
 }
 
+/// Whether a hot connect group may be plugged in at a port.
+fn is_changeable(plan: &Plan, node: usize, port: Port) -> bool {
+    let end = End::Controller(node, port);
+    let below = plan.tree.child(node, port);
+    plan.groups.iter().filter(|group| group.optional).any(|group| {
+        let is_its_own = below.is_some_and(|below| group.first().index() == below);
+        let is_free = below.is_none() && group.places.is_empty();
+        is_its_own || is_free || group.places.contains(&end)
+    })
+}
+
 /// Whom an event is about.
 #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of the network")]
 pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
@@ -293,6 +321,7 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::DeviceLost { id }
         | Event::DeviceBack { id, .. }
         | Event::WrongDevice { id, .. }
+        | Event::WrongIdentification { id, .. }
         | Event::Counters { id, .. }
         | Event::CountersCleared { id, .. }
         | Event::ClockDifference { id, .. }

@@ -10,6 +10,7 @@
 mod counters;
 mod device;
 mod entry;
+mod group_status;
 mod network_status;
 mod wording;
 
@@ -26,6 +27,7 @@ use crate::event::Event;
 pub use counters::CounterTotals;
 pub use device::{AbnormalChange, WatchedDevice};
 pub use entry::{EntryKind, LogEntry, Severity};
+pub use group_status::GroupStatus;
 pub use network_status::NetworkStatus;
 
 /// So many entries wait for somebody who fetches them; older ones are dropped and counted.
@@ -84,7 +86,10 @@ impl Watch {
     /// Something happened.
     pub fn handle_event(&mut self, now: Instant, event: &Event) {
         self.handle_timeout(now);
-        if let Event::DeviceLost { id } = event {
+        // That a group has left is told by itself.
+        if let Event::DeviceLost { id } = event
+            && !self.plan.is_optional(*id)
+        {
             if self.lost.is_empty() {
                 self.lost_at = now;
             }

@@ -10,6 +10,7 @@ use linesman_proto::state::{AlState, NetworkState, StateValue};
 use linesman_proto::time::Instant;
 
 use super::device::concerned;
+use super::group_status::GroupStatus;
 use super::{CounterTotals, WatchedDevice};
 use crate::event::Event;
 
@@ -17,6 +18,8 @@ use crate::event::Event;
 #[derive(Clone, Debug)]
 pub struct NetworkStatus {
     devices: Vec<WatchedDevice>,
+    /// The hot connect groups of the plan, in its order.
+    groups: Vec<GroupStatus>,
     /// Bits that do not follow from the SubDevices.
     own: NetworkState,
     responding: Option<WorkingCounter>,
@@ -29,7 +32,9 @@ impl NetworkStatus {
     #[must_use]
     pub fn new(plan: &Plan) -> Self {
         let devices = plan.devices.iter().map(|device| WatchedDevice::new(plan, device)).collect();
-        Self { devices, own: NetworkState::default(), responding: None, network_time: None }
+        let groups = plan.groups.iter().map(GroupStatus::new).collect();
+        let own = NetworkState::default();
+        Self { devices, groups, own, responding: None, network_time: None }
     }
 
     /// What is known of each SubDevice, by [`DeviceId`].
@@ -44,11 +49,43 @@ impl NetworkStatus {
         self.devices.get(id.index())
     }
 
+    /// The hot connect groups, in the order of the plan.
+    #[must_use]
+    pub fn groups(&self) -> &[GroupStatus] {
+        &self.groups
+    }
+
+    /// How many SubDevices of hot connect groups are planned, and how many of them are there (HC-15).
+    #[must_use]
+    pub fn hot_connect_counts(&self) -> (usize, usize) {
+        let members = || self.groups.iter().flat_map(GroupStatus::members);
+        let is_there = |id: &&DeviceId| {
+            self.device(**id).is_some_and(|device| device.is_present() == Some(true))
+        };
+        (members().count(), members().filter(is_there).count())
+    }
+
+    /// How many SubDevices are not there, and may be absent.
+    pub(super) fn excused(&self) -> usize {
+        self.devices.iter().filter(|device| device.is_excused()).count()
+    }
+
+    /// All SubDevices in the order of a topology list: those that are always there in processing order, then
+    /// the groups (HC-15).
+    #[must_use]
+    pub fn topology_order(&self) -> Vec<DeviceId> {
+        let of_groups: Vec<DeviceId> =
+            self.groups.iter().flat_map(GroupStatus::members).copied().collect();
+        let all = self.devices.iter().map(WatchedDevice::id);
+        let fixed = all.filter(|id| !of_groups.contains(id));
+        fixed.chain(of_groups.iter().copied()).collect()
+    }
+
     /// The network's state word (PLC-07).
     #[must_use]
     pub fn network_state(&self) -> NetworkState {
         let mut word = self.own;
-        for device in &self.devices {
+        for device in self.devices.iter().filter(|device| !device.is_excused()) {
             let state = device.state();
             let bit = match state.state() {
                 StateValue::Known(AlState::PreOp) => NetworkState::SOME_PREOP,
@@ -109,6 +146,16 @@ impl NetworkStatus {
             Event::Responding { now: count, .. } => self.responding = Some(*count),
             Event::Ring { intact } => {
                 self.set(NetworkState::REDUNDANCY_FRAME_MISSING, !intact);
+            }
+            Event::GroupJoined { group, place } => {
+                if let Some(group) = self.groups.get_mut(*group) {
+                    (group.joined, group.place) = (true, *place);
+                }
+            }
+            Event::GroupLeft { group } => {
+                if let Some(group) = self.groups.get_mut(*group) {
+                    (group.joined, group.place) = (false, None);
+                }
             }
             Event::NetworkTime { id, ahead_ns } => self.network_time = Some((*id, *ahead_ns)),
             Event::OutputsWithheld { .. } => {

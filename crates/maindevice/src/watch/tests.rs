@@ -1,5 +1,5 @@
 use linesman_config::identity::Mismatch;
-use linesman_config::plan::DevicePlan;
+use linesman_config::plan::{DevicePlan, HotConnectGroup};
 use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
 use linesman_proto::port::Port;
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters};
@@ -31,6 +31,62 @@ fn watch() -> Watch {
         plan.devices.push(device);
     }
     Watch::new(Arc::new(plan))
+}
+
+/// The same, of which the terminals 65 and 66 are a group that may be absent.
+fn watch_with_group() -> Watch {
+    let mut plan = Plan::clone(watch().plan());
+    plan.groups.push(HotConnectGroup {
+        name: "tool".to_owned(),
+        members: vec![DeviceId(1), DeviceId(2)],
+        optional: true,
+        places: Vec::new(),
+    });
+    Watch::new(Arc::new(plan))
+}
+
+// proves: HC-15 (U)
+#[test]
+fn groups_stand_last_in_the_topology_list_with_planned_and_present_counts() {
+    let mut watch = watch_with_group();
+    let order = watch.network_status().topology_order();
+    assert_eq!(order, [0, 3, 4, 5, 6, 1, 2].map(DeviceId));
+    assert_eq!(watch.network_status().hot_connect_counts(), (2, 0));
+    for id in 0..7 {
+        if id != 2 {
+            watch.handle_event(at(1), &state(id, AlState::Op, false, 0));
+        }
+    }
+    assert_eq!(watch.network_status().hot_connect_counts(), (2, 1));
+    assert_eq!(watch.network_status().topology_order(), order);
+}
+
+#[test]
+fn a_group_that_joins_and_leaves_is_told_and_its_absence_is_no_error() {
+    let mut watch = watch_with_group();
+    for id in [0, 3, 4, 5, 6] {
+        watch.handle_event(at(1), &state(id, AlState::Op, false, 0));
+    }
+    assert_eq!(watch.network_status().network_state(), NetworkState::default());
+    watch.handle_event(at(1), &Event::AllReached);
+    let place = Some((DeviceId(0), Port::C));
+    watch.handle_event(at(2), &Event::GroupJoined { group: 0, place });
+    let group = watch.network_status().groups()[0].clone();
+    assert_eq!((group.has_joined(), group.place()), (true, place));
+    watch.handle_event(at(3), &Event::DeviceLost { id: DeviceId(1) });
+    watch.handle_event(at(3), &Event::GroupLeft { group: 0 });
+    watch.handle_event(at(4), &Event::GroupMisplaced { group: 0, place: None });
+    watch.handle_timeout(at(1_000));
+    let said = texts(&mut watch);
+    assert_eq!(
+        said[0],
+        "5 SubDevices have reached their states; 2 of hot connect groups are not plugged in"
+    );
+    assert!(said[1].starts_with("hot connect group tool joined at port C of "), "{said:?}");
+    assert_eq!(said[2], "hot connect group tool left: its data are not valid any more");
+    assert!(said[3].contains("at an unknown port, where it may not be"), "{said:?}");
+    assert_eq!(said.len(), 4, "{said:?}");
+    assert!(!watch.network_status().groups()[0].has_joined());
 }
 
 fn at(ms: u64) -> Instant {

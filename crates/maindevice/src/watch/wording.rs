@@ -12,6 +12,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::{EntryKind, LogEntry, NetworkStatus, Severity};
 use crate::event::Event;
+use crate::supervisor::GroupPlace;
 
 /// The entries for an event; `network_status` is that before it.
 // Long for its number of events: one short arm each; longer wordings are methods of `EntryWords`.
@@ -38,7 +39,10 @@ pub(super) fn of(
         Event::TargetReached { id, .. } => {
             words.states(event, Some(*id), Severity::Info, EntryKind::State)
         }
-        Event::WrongDevice { id, .. } | Event::AliasShared { id, .. } => {
+        Event::WrongDevice { id, .. }
+        | Event::AliasShared { id, .. }
+        | Event::WrongIdentification { id, .. }
+        | Event::IdentificationShared { id, .. } => {
             words.states(event, Some(*id), Severity::Error, EntryKind::Identity)
         }
         Event::UnplannedDevice { .. } => {
@@ -47,15 +51,22 @@ pub(super) fn of(
         Event::AllReached => vec![words.line(
             Severity::Info,
             EntryKind::State,
-            match words.plan.devices.len() {
-                1 => "the SubDevice has reached its state".to_owned(),
-                count => format!("all {count} SubDevices have reached their states"),
+            match (words.plan.devices.len(), network_status.excused()) {
+                (1, _) => "the SubDevice has reached its state".to_owned(),
+                (count, 0) => format!("all {count} SubDevices have reached their states"),
+                (count, absent) => format!(
+                    "{} SubDevices have reached their states; {absent} of hot connect groups are not plugged in",
+                    count.saturating_sub(absent)
+                ),
             },
         )],
         Event::DeviceBack { id, restarted } => {
             let how = if *restarted { ", after a restart" } else { "" };
             let text = format!(" Communication re-established{how}");
             vec![words.about(*id, Severity::Info, EntryKind::Communication, text)]
+        }
+        Event::GroupJoined { .. } | Event::GroupLeft { .. } | Event::GroupMisplaced { .. } => {
+            words.group(event)
         }
         Event::Responding { before, now } => {
             let severity = if now < before { Severity::Warning } else { Severity::Info };
@@ -115,6 +126,40 @@ struct EntryWords<'a> {
 }
 
 impl EntryWords<'_> {
+    /// A hot connect group came, went, or is where it may not be.
+    #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of no group")]
+    fn group(&self, event: &Event) -> Vec<LogEntry> {
+        let at = |place: &Option<GroupPlace>| match place {
+            None => "an unknown port".to_owned(),
+            Some((id, port)) => format!("port {port} of {}", name(self.plan, *id)),
+        };
+        let group = |at: &usize| self.plan.groups.get(*at);
+        let (group, severity, text) = match event {
+            Event::GroupJoined { group: at_index, place } => {
+                (group(at_index), Severity::Info, format!("joined at {}", at(place)))
+            }
+            Event::GroupLeft { group: at_index } => {
+                let group = group(at_index);
+                let optional = group.is_some_and(|group| group.optional);
+                let severity = if optional { Severity::Info } else { Severity::Error };
+                (group, severity, "left: its data are not valid any more".to_owned())
+            }
+            Event::GroupMisplaced { group: at_index, place } => {
+                let text = format!(
+                    "is plugged in at {}, where it may not be: it is kept in INIT. Do: plug it in at one of its \
+                     `places`, or add that port to them",
+                    at(place)
+                );
+                (group(at_index), Severity::Error, text)
+            }
+            _ => return Vec::new(),
+        };
+        let Some(group) = group else { return Vec::new() };
+        let text = format!("hot connect group {} {text}", group.name);
+        let entry = self.line(severity, EntryKind::Communication, text);
+        vec![LogEntry { device: Some(group.first()), ..entry }]
+    }
+
     /// An entry about a SubDevice.
     fn about(&self, id: DeviceId, severity: Severity, kind: EntryKind, text: String) -> LogEntry {
         let text = format!("{}{text}", name(self.plan, id));

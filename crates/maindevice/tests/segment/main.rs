@@ -8,6 +8,7 @@ mod bench;
 mod clocks;
 mod described;
 mod ethernet;
+mod hot_connect;
 mod library;
 mod loop_control;
 mod mailbox;

@@ -257,9 +257,10 @@ impl GeneralFlags {
 }
 
 /// How the identification value of a SubDevice can be read.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum Identification {
     /// Not at all; only the station alias is left.
+    #[default]
     None,
     /// Request by AL control bit 5, answer in register 0x0134.
     AlStatus,

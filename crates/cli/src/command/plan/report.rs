@@ -1,6 +1,7 @@
 //! A plan as JSON, `linesman.plan/1`.
 
 mod clock;
+pub(super) mod removable;
 pub(super) mod timing;
 
 use linesman_config::plan::timing::PlanTiming;
@@ -16,6 +17,7 @@ use linesman_runtime::plan_file::PlanFile;
 use serde::Serialize;
 
 use self::clock::ClockReport;
+use self::removable::{CableReport, HotConnectReport};
 use self::timing::PlanTimingReport;
 use super::ethernet::EthernetPlanReport;
 use crate::command::ebus::{self, EbusReport};
@@ -45,6 +47,10 @@ pub(crate) struct PlanReport {
     ebus: Vec<EbusReport>,
     /// The distributed clocks; `null` without any.
     clock: Option<ClockReport>,
+    /// Groups that join and leave while the network runs.
+    groups: Vec<HotConnectReport>,
+    /// The cables, and which of them may break without the loss of a SubDevice.
+    cables: Vec<CableReport>,
     /// The timing of SubDevices with SYNC0; `null` unless asked for (`--timing`).
     timing: Option<PlanTimingReport>,
     /// Ethernet over EtherCAT; `null` unless asked for (`--ethernet`).
@@ -249,6 +255,8 @@ pub(super) fn report(
             plan.device(id).map_or_else(String::new, |device| device.name.clone())
         }),
         clock: clock::of(plan),
+        groups: removable::groups(plan),
+        cables: removable::cables(plan),
         timing: timing.map(|timing| timing::of(plan, timing)),
         ethernet,
         findings: doubts.iter().map(finding).collect(),

@@ -6,6 +6,7 @@ use linesman_proto::frame::size::load_percent;
 use linesman_proto::sii::Direction;
 use linesman_runtime::plan_file::PlanFile;
 
+use super::report::removable;
 use super::report::{bits, counter, shares, unit_of};
 use crate::output::{Output, Table, wrapped};
 use crate::text::quantity::count;
@@ -33,6 +34,8 @@ pub(super) fn text(file: &PlanFile, doubts: &[Doubt], verbose: bool, output: &Ou
     }
     text.push_str(&ebus(plan, output));
     text.push_str(&clocks(plan, output));
+    text.push_str(&groups(plan, output));
+    text.push_str(&cables(plan, output));
     for doubt in doubts {
         let label = match doubt.severity {
             Severity::Error => paint.bad("error"),
@@ -188,4 +191,56 @@ fn clocks(plan: &Plan, output: &Output) -> String {
         plan.least_delay().as_nanos() as f64 / 1e3,
         table.render()
     )
+}
+
+fn groups(plan: &Plan, output: &Output) -> String {
+    if plan.groups.is_empty() {
+        return String::new();
+    }
+    let headings = [
+        "Hot connect group",
+        "First",
+        "SubDevices",
+        "Known by",
+        "Number",
+        "Places",
+        "May be absent",
+    ];
+    let mut table = Table::new(&headings, output.paint());
+    for group in &plan.groups {
+        let first = plan.device(group.first());
+        let check = first.and_then(|device| device.settings.identification);
+        let places = group.places.iter().map(|place| removable::written(plan, *place));
+        let places: Vec<String> = places.collect();
+        table.row([
+            group.name.clone(),
+            first.map(|device| device.name.clone()).unwrap_or_default(),
+            group.members.len().to_string(),
+            check.map(|check| check.source.to_string()).unwrap_or_default(),
+            check.map(|check| check.value.to_string()).unwrap_or_default(),
+            if places.is_empty() { "any free port".to_owned() } else { places.join(", ") },
+            if group.optional { "yes".to_owned() } else { "no".to_owned() },
+        ]);
+    }
+    format!("\n{}", table.render())
+}
+
+/// The cables of a ring: those that may break, and those whose break costs SubDevices (RED-08, RED-09).
+fn cables(plan: &Plan, output: &Output) -> String {
+    if plan.tree.closes_at().is_none() {
+        return String::new();
+    }
+    let paint = output.paint();
+    let mut table = Table::new(&["Cable", "", "may break", "lost with it"], paint);
+    for cable in plan.cables() {
+        let names = cable.lost.iter().filter_map(|id| plan.device(*id));
+        let lost: Vec<&str> = names.map(|device| device.name.as_str()).collect();
+        table.row([
+            removable::written(plan, cable.link.upstream),
+            removable::written(plan, cable.link.downstream),
+            if cable.may_break { paint.good("yes") } else { paint.bad("no") },
+            lost.join(", "),
+        ]);
+    }
+    format!("\n{}", table.render())
 }

@@ -63,6 +63,8 @@ pub(super) fn against(project: &Project, planned: &Tree, inventory: &Inventory) 
         Side { tree: planned, nodes: &wanted },
         Side { tree: inventory.tree(), nodes: &there },
     );
+    let may_go = project.optional_devices();
+    let comparison = comparison.without_groups(|node| may_go.contains_key(&node));
     let names = Names { project, inventory };
     Against {
         as_planned: comparison.differences.is_empty(),

@@ -31,10 +31,14 @@ pub(super) fn head(
         // A NOP keeps a place in the frame.
         let latched = DatagramAddress::Physical(0, RECEIVE_TIME.address);
         head.push(datagram(Command::Nop, latched, TIME_LEN, Role::LatchedTime));
-        // By position: before its station address is there, the clocks must run already.
-        let position = 0_u16.wrapping_sub(reference.index() as u16);
-        let time = DatagramAddress::Physical(position, SYSTEM_TIME.address);
-        head.push(datagram(Command::Armw, time, TIME_LEN, Role::ReferenceClock));
+        // By position: before its station address is there, the clocks must run already. Groups that come
+        // and go move positions; then by its station address.
+        let (command, at) = match devices.get(reference.index()) {
+            Some(planned) if !plan.groups.is_empty() => (Command::Frmw, planned.station.0),
+            Some(_) | None => (Command::Armw, 0_u16.wrapping_sub(reference.index() as u16)),
+        };
+        let time = DatagramAddress::Physical(at, SYSTEM_TIME.address);
+        head.push(datagram(command, time, TIME_LEN, Role::ReferenceClock));
     }
     if options.mailbox_states {
         let count = map_mailboxes(plan, devices);

@@ -22,7 +22,8 @@ use linesman_proto::topology::Tree;
 use self::area::Run;
 use self::group::{Group, groups};
 use super::{
-    DatagramPlan, DevicePlan, FramePlan, IoAt, Ownership, Plan, PlannedDevice, Role, SyncUnit, Task,
+    DatagramPlan, DevicePlan, FramePlan, HotConnectGroup, IoAt, Ownership, Plan, PlannedDevice,
+    Role, SyncUnit, Task,
 };
 use crate::profile::ProcessSyncManager;
 
@@ -67,6 +68,8 @@ pub struct PlanOptions {
     pub sync_window: Option<Span>,
     /// Ports whose link was lost open by order only.
     pub ports_open_by_order: bool,
+    /// Groups that join and leave while the network runs.
+    pub groups: Vec<HotConnectGroup>,
 }
 
 impl Default for PlanOptions {
@@ -84,6 +87,7 @@ impl Default for PlanOptions {
             inputs_shift_ns: None,
             sync_window: None,
             ports_open_by_order: false,
+            groups: Vec::new(),
         }
     }
 }
@@ -193,6 +197,7 @@ impl Plan {
             inputs_shift_ns: options.inputs_shift_ns,
             sync_window: options.sync_window,
             ports_open_by_order: options.ports_open_by_order,
+            groups: options.groups.clone(),
             ..Self::empty(tree)
         };
         let tasks = match options.tasks.as_slice() {
@@ -205,7 +210,7 @@ impl Plan {
         for (index, (task, members)) in tasks.iter().zip(members).enumerate() {
             let mut layout = TaskLayout::new(index, task, options);
             let mut datagrams = std::mem::take(&mut extra);
-            for unit in units(devices, &members) {
+            for unit in units(devices, &members, &options.groups) {
                 layout.place_unit(unit, devices, &mut plan, &mut datagrams)?;
             }
             if index == last && options.presence {
@@ -277,18 +282,40 @@ fn members(devices: &[PlannedDevice], tasks: &[TaskOptions]) -> Result<Vec<Vec<u
 }
 
 /// The sync units of a task in the order in which they first occur, with those that have process
-/// data.
-fn units<'a>(devices: &'a [PlannedDevice], members: &[usize]) -> Vec<(&'a str, Vec<usize>)> {
+/// data. A hot connect group has sync units of its own, behind all others: datagrams of others keep their
+/// working counters when it comes and goes (HC-01).
+fn units<'a>(
+    devices: &'a [PlannedDevice],
+    members: &[usize],
+    groups: &'a [HotConnectGroup],
+) -> Vec<(&'a str, Vec<usize>)> {
     let mut units: Vec<(&str, Vec<usize>)> = Vec::new();
-    for &member in members {
+    // The group of a sync unit, in the same order.
+    let mut owners: Vec<Option<usize>> = Vec::new();
+    let group_of = |member: usize| {
+        groups.iter().position(|group| group.members.contains(&DeviceId(member as u32)))
+    };
+    let (mut of_groups, mut fixed): (Vec<usize>, Vec<usize>) =
+        members.iter().partition(|member| group_of(**member).is_some());
+    of_groups.sort_by_key(|member| group_of(*member));
+    fixed.append(&mut of_groups);
+    let members = fixed;
+    for member in members {
         let device = &devices[member];
         if device.profile.process.iter().all(|manager| manager.len == 0) {
             continue;
         }
-        let name = device.settings.sync_unit.as_deref().unwrap_or(DEFAULT_UNIT);
-        match units.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, of_unit)) => of_unit.push(member),
-            None => units.push((name, vec![member])),
+        let group = group_of(member);
+        let default = group.map_or(DEFAULT_UNIT, |group| groups[group].name.as_str());
+        let name = device.settings.sync_unit.as_deref().unwrap_or(default);
+        let known = units.iter_mut().zip(&owners);
+        let mut same = known.filter(|((known, _), owner)| *known == name && **owner == group);
+        match same.next() {
+            Some(((_, of_unit), _)) => of_unit.push(member),
+            None => {
+                units.push((name, vec![member]));
+                owners.push(group);
+            }
         }
     }
     if units.is_empty() {

@@ -160,8 +160,17 @@ impl Addresses {
         let is_certain = |position: usize| {
             position < passed && (is_whole || is_line || position < before_any_away)
         };
-        for (position, id) in self.order.iter().enumerate() {
-            let known = is_certain(position).then_some(Position(position as u16));
+        let fixed = self.order.iter().filter(|id| !model.optional.contains_key(id)).count();
+        let mut positions = 0..;
+        for (place, id) in self.order.iter().enumerate() {
+            // Where groups come and go, places are certain while no group is there.
+            let known = match model.optional.is_empty() {
+                true => is_certain(place).then_some(Position(place as u16)),
+                false if passed == fixed && !model.optional.contains_key(id) => {
+                    positions.next().map(Position)
+                }
+                false => None,
+            };
             if let Some(device) = model.device_mut(*id) {
                 device.position = known;
             }
@@ -188,6 +197,8 @@ impl Addresses {
             let present = usize::from(one);
             present < self.order.len() || (model.tree.is_none() && present < model.devices.len())
         });
+        // Groups that come and go may be anywhere.
+        let is_partial = is_partial || !model.optional.is_empty();
         let known = match (is_partial, &model.tree) {
             (true, None) => self.named_here(answer).or_else(|| self.among_present(model, index)),
             (true, Some(_)) => model.by_position(position),
