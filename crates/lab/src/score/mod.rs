@@ -26,6 +26,7 @@ pub mod report;
 mod sharing;
 pub mod tally;
 mod trace;
+mod unplayable;
 
 pub use case::{CaseKind, ScoreOptions};
 pub use perturb::Perturbation;
@@ -34,3 +35,4 @@ pub use rate::Rate;
 pub use recorder::RecordedFrame;
 pub use report::ScoreReport;
 pub use tally::Tally;
+pub use unplayable::Unplayable;

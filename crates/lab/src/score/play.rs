@@ -1,6 +1,5 @@
 //! One case, played: brought up, watched while all is well, broken, judged.
 
-use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::fault::FaultName;
@@ -26,6 +25,7 @@ use super::judge::{Accusations, Candidates, Judged, claim, judge};
 use super::listen::{HealthyListened, Heard, Listeners};
 use super::parts::span_ns;
 use super::recorder::{SharedRecording, take_down, take_down_host};
+use super::unplayable::Unplayable;
 use crate::choice::{LineOutline, are_apart, is_behind, text};
 use crate::habit::Habit;
 use crate::lab::{Lab, LabError};
@@ -122,23 +122,6 @@ pub struct FaultOutcome {
     pub is_pause: bool,
     /// What listeners said of it, beside a MainDevice with the habits of others.
     pub listened: Option<Listeners>,
-}
-
-/// Why a case could not be played.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-pub enum Unplayable {
-    /// None of the plants that were drawn has a place for the faults.
-    NoPlace(String),
-    /// The line did not come up, or stopped for good, though nothing was wrong yet.
-    NotUp(String),
-}
-
-impl fmt::Display for Unplayable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoPlace(why) | Self::NotUp(why) => f.write_str(why),
-        }
-    }
 }
 
 impl CaseReport {
@@ -339,13 +322,9 @@ impl<'a> Play<'a> {
             report.healthy_for = self.lab.now().since(Instant::ZERO);
             report.healthy_listened = self.healthy_listened();
             if self.case.kind == CaseKind::Healthy {
-                if self.options.keeps_heard {
-                    report.heard = self.heard(None);
-                }
-                if self.options.keeps_reports {
-                    report.plant = Some(Box::new(self.case.file.clone()));
-                    report.reports = Some(Box::new([self.lab.diagnosis(), self.recorded()]));
-                }
+                report.heard =
+                    self.options.keeps_heard.then(|| self.heard(None)).unwrap_or_default();
+                self.keep_reports(&mut report, self.lab.diagnosis(), self.recorded());
                 return Ok(report);
             }
             self.break_line(&mut active)?;
@@ -369,14 +348,18 @@ impl<'a> Play<'a> {
             let pair = [(one, first), (other, second)];
             self.each_its_own(pair, &diagnosis, &recorded);
         }
-        if self.options.keeps_reports {
-            report.plant = Some(Box::new(self.case.file.clone()));
-            report.reports = Some(Box::new([diagnosis, recorded]));
-        }
+        self.keep_reports(&mut report, diagnosis, recorded);
         if let (true, Some(first)) = (self.options.keeps_heard, active.first()) {
             report.heard = self.heard(self.lab.truth().fault(first.id));
         }
         Ok(report)
+    }
+
+    fn keep_reports(&self, report: &mut CaseReport, live: Diagnosis, recorded: Diagnosis) {
+        if self.options.keeps_reports {
+            report.plant = Some(Box::new(self.case.file.clone()));
+            report.reports = Some(Box::new([live, recorded]));
+        }
     }
 
     pub(super) fn run(&mut self, span: Span) -> Result<(), LabError> {

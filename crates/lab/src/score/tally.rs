@@ -8,12 +8,13 @@ use linesman_proto::time::Span;
 use super::case::{CaseKind, ScoreOptions};
 use super::judge::Judged;
 use super::listen::tally::ListenTally;
-use super::play::{CaseReport, FaultOutcome, Unplayable};
+use super::play::{CaseReport, FaultOutcome};
 use super::rate::{Count, rounded};
 use super::report::{
     Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, LeftOut, PairRates, SCHEMA,
     ScoreReport, SideReport, WrongReport,
 };
+use super::unplayable::Unplayable;
 use crate::habit::Habit;
 use crate::verdict::{Grade, Match};
 

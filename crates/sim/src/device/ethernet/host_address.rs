@@ -25,7 +25,7 @@ pub enum HostAddress {
 }
 
 impl HostAddress {
-    /// The address that a MainDevice has set: 0.0.0.0 makes it a DHCP client, as devices in the field take it.
+    /// The address that a MainDevice has set. 0.0.0.0 makes it a DHCP client: no source says how a SubDevice is told so.
     #[must_use]
     pub fn of_parameters(parameters: &IpParameters) -> Self {
         match parameters.ip {
