@@ -220,6 +220,8 @@ fn what_is_no_description_is_refused_with_its_place() {
     assert_eq!(refused(""), "line 1, XML: there is no element in it");
     assert!(refused("<html>\n</html>").starts_with("line 1, html: no device description"));
     assert_eq!(refused("<EtherCATInfo>\n<Vendor>"), "line 2, Vendor: the file ends within it");
+    let cut = refused("<EtherCATInfo>\n<Vendor");
+    assert!(cut.starts_with("line 2, XML: the file ends within a tag or comment: "), "{cut}");
     assert!(refused("<EtherCATInfo>\n</Vendor>").starts_with("line 2, XML: "));
     let bomb = "<!DOCTYPE a [<!ENTITY x \"xxxxxxxx\">]><EtherCATInfo><Vendor><Name>&x;</Name>";
     assert_eq!(refused(bomb), "line 1, Name: an entity that XML does not know");

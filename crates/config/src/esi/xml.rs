@@ -205,7 +205,19 @@ impl<'a> XmlSource<'a> {
         let from = usize::try_from(self.reader.buffer_position()).unwrap_or(usize::MAX);
         self.count_to(from);
         let event = self.reader.read_event();
-        event.map_err(|error| EsiError::new(self.line, "XML", format!("{error}")))
+        event.map_err(|error| self.broken(&error))
+    }
+
+    /// What is wrong where the reader stands.
+    fn broken(&self, error: &quick_xml::Error) -> EsiError {
+        use quick_xml::errors::{Error, SyntaxError};
+        let reason = match error {
+            Error::Syntax(SyntaxError::InvalidBangMarkup) => error.to_string(),
+            // The others are all that the input ends before something.
+            Error::Syntax(open) => format!("the file ends within a tag or comment: {open}"),
+            _ => error.to_string(),
+        };
+        EsiError::new(self.line, "XML", reason)
     }
 
     fn count_to(&mut self, to: usize) {
@@ -225,7 +237,7 @@ impl<'a> XmlSource<'a> {
     ) -> Result<bool, EsiError> {
         let before = self.reader.clone();
         let span = self.reader.read_to_end(start.name());
-        let span = span.map_err(|error| EsiError::new(self.line, "XML", format!("{error}")))?;
+        let span = span.map_err(|error| self.broken(&error))?;
         let at = |position: u64| usize::try_from(position).unwrap_or(usize::MAX);
         if skip(at(span.start)..at(span.end)) {
             return Ok(true);
