@@ -39,7 +39,7 @@ pub struct ProjectGroup {
 /// The number by which a device is told apart from its equals: `identification = { … }`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table such as { by = \"selector\", value = 5 }")]
 pub struct IdentificationChoice {
     /// Where the number comes from.
     pub by: IdentificationWay,

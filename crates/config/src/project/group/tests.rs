@@ -161,6 +161,10 @@ fn mistakes_in_groups_are_named_with_the_line_and_the_next_step() {
             with("identification = { by = \"selector\", value = 300 }\n", ""),
             "nothing tells it from others: expected `identification",
         ),
+        (
+            with("{ by = \"selector\", value = 300 }", "\"selector\""),
+            "expected a table such as { by = \"selector\", value = 5 }",
+        ),
         (with("value = 300 }", "value = 0 }"), "value 0, expected 1 to 65535"),
         (with(", value = 300 }", " }"), "there is no number: expected `value`"),
         (with("value = 300 }", "value = 70000 }"), "value 70000, expected 1 to 65535"),
