@@ -211,11 +211,20 @@ impl<'a> XmlSource<'a> {
     /// What is wrong where the reader stands.
     fn broken(&self, error: &quick_xml::Error) -> EsiError {
         use quick_xml::errors::{Error, SyntaxError};
-        let reason = match error {
-            Error::Syntax(SyntaxError::InvalidBangMarkup) => error.to_string(),
-            // The others are all that the input ends before something.
-            Error::Syntax(open) => format!("the file ends within a tag or comment: {open}"),
-            _ => error.to_string(),
+        // All syntax errors but one are that the input ends before something.
+        let open = match error {
+            Error::Syntax(open) if *open != SyntaxError::InvalidBangMarkup => Some(open),
+            Error::Syntax(_)
+            | Error::Io(_)
+            | Error::IllFormed(_)
+            | Error::InvalidAttr(_)
+            | Error::Encoding(_)
+            | Error::Escape(_)
+            | Error::Namespace(_) => None,
+        };
+        let reason = match open {
+            Some(open) => format!("the file ends within a tag or comment: {open}"),
+            None => error.to_string(),
         };
         EsiError::new(self.line, "XML", reason)
     }
