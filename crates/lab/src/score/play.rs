@@ -322,8 +322,9 @@ impl<'a> Play<'a> {
             report.healthy_for = self.lab.now().since(Instant::ZERO);
             report.healthy_listened = self.healthy_listened();
             if self.case.kind == CaseKind::Healthy {
-                report.heard =
-                    self.options.keeps_heard.then(|| self.heard(None)).unwrap_or_default();
+                if self.options.keeps_heard {
+                    report.heard = self.heard(None);
+                }
                 self.keep_reports(&mut report, self.lab.diagnosis(), self.recorded());
                 return Ok(report);
             }
