@@ -35,8 +35,8 @@ impl Play<'_> {
     }
 }
 
-/// Of two faults with one finding, gives one of them the finding that it has beside that; the second one unless only
-/// the first has a right one.
+/// Of two faults with one finding, gives one of them the finding that it has beside that: the one with which more of
+/// the two are right, and the second one where both ways are alike.
 fn share_out(
     (a, a_else): (&mut Judged, Option<Judged>),
     (b, b_else): (&mut Judged, Option<Judged>),
@@ -47,10 +47,10 @@ fn share_out(
         ..new
     };
     let rank = |kept: &Judged, other: &Option<Judged>| {
-        let other = other
-            .as_ref()
-            .map_or((false, false), |one| (one.fits.place.is_right(), one.is_right()));
-        (kept.fits.place.is_right() && other.0, kept.is_right() && other.1)
+        let right = |is_right: fn(&Judged) -> bool| {
+            usize::from(is_right(kept)) + usize::from(other.as_ref().is_some_and(is_right))
+        };
+        (right(|one| one.fits.place.is_right()), right(Judged::is_right))
     };
     if rank(a, &b_else) >= rank(b, &a_else) {
         *b = times(b_else.unwrap_or(Judged::silence()), b);
