@@ -1,5 +1,6 @@
 //! Diagnosis of one network: its model, and the times at which its rules run.
 
+use linesman_proto::address::Path;
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::{Instant, Span};
 
@@ -120,6 +121,7 @@ impl NetworkWatch {
         is_open
             || self.model.devices.iter().any(|device| device.mailbox.is_open())
             || is_recent(self.model.traffic.losses.frames().last)
+            || Path::ALL.iter().any(|card| is_recent(self.model.traffic.losses.copies(*card).last))
             || self.model.devices.iter().any(|device| {
                 device.counters.last_rise().is_some_and(|at| now < at + WATCHED_AFTER_RISE)
             })

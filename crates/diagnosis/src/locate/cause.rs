@@ -98,8 +98,11 @@ impl Suspicion {
                 other.hop.link == damage.hop.link && other.hop.direction != damage.hop.direction
             });
             match damage.hop.from {
+                // Noise hits symbols: many bad frames without any are not its doing, whatever the way back shows.
                 // One device that spoils frames inside does so at each of its outputs.
-                End::Controller(node, _) if is_clean(damage) && !both => {
+                End::Controller(node, _)
+                    if is_clean(damage) && (!both || damage.frames >= MANY) =>
+                {
                     group(&mut senders, node).damages.push(damage.clone());
                 }
                 End::Controller(..) | End::MainDevice(_) => {

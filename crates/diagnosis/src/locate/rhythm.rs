@@ -27,12 +27,15 @@ const ENOUGH_MEETINGS: usize = 2;
 /// Whether they meet more often than by chance is seen from the same two series, moved against each other in
 /// circles: each keeps its own rhythm, and how often places are hit and read does not matter.
 pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]) -> bool {
+    let lasted = [a, b].map(|damages| all_hits(input, damages).last().copied());
     let (a, b) = (hits(input, a), hits(input, b));
     let ends = |hits: &[TimeInterval]| Some((*hits.first()?, *hits.last()?));
     let (Some((a_first, a_last)), Some((b_first, b_last))) = (ends(&a), ends(&b)) else {
         return false;
     };
-    if meet(a_first, b_first) && meet(a_last, b_last) {
+    // One that goes on after the last close reading does not end there.
+    let is_end = lasted == [Some(a_last), Some(b_last)];
+    if meet(a_first, b_first) && meet(a_last, b_last) && is_end {
         return true;
     }
     let both = (a_first.0.max(b_first.0), a_last.1.min(b_last.1));
@@ -59,10 +62,14 @@ pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]
 /// When a place was hit, in order, as far as it was read closely: a hit lies between the reading before a rise
 /// and the reading that shows it.
 fn hits(input: &LocateInput<'_>, damages: &[Damage]) -> Vec<TimeInterval> {
+    let is_close = |(begin, end): &TimeInterval| end.since(*begin) <= CLOSE_READING;
+    all_hits(input, damages).into_iter().filter(is_close).collect()
+}
+
+/// When a place was hit, in order.
+fn all_hits(input: &LocateInput<'_>, damages: &[Damage]) -> Vec<TimeInterval> {
     let rises = damages.iter().flat_map(|damage| rises(input, damage));
-    let between = rises.map(|rise| (rise.after_time, rise.at));
-    let mut hits: Vec<TimeInterval> =
-        between.filter(|(begin, end)| end.since(*begin) <= CLOSE_READING).collect();
+    let mut hits: Vec<TimeInterval> = rises.map(|rise| (rise.after_time, rise.at)).collect();
     hits.sort_unstable();
     hits.dedup();
     hits

@@ -3,8 +3,8 @@
 //! Other computers' frames travel on the line.
 //!
 //! **How it is found.** A frame with another EtherType comes in by the card, or stands in the recording. Or
-//! the processing unit of a controller counts errors (0x030C) while no port of any controller counts a
-//! damaged frame: as long as bit 0 of DL control (0x0100) is set, as after power-on, a controller destroys
+//! the processing unit of a controller counts errors (0x030C) while no port before it, on the way that frames take,
+//! counts a damaged frame: as long as bit 0 of DL control (0x0100) is set, as after power-on, a controller destroys
 //! what is not EtherCAT and counts it there, and only the first one on the way sees any.
 //!
 //! **What it means.** A switch, an office computer or the operating system's own services share the cable.
@@ -14,13 +14,16 @@
 //! **What to do.** Connect the card to the first SubDevice directly, and take other protocols off this
 //! interface.
 
+use std::collections::BTreeSet;
+
 use linesman_config::fault::{Class, FaultName};
+use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Span;
 
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, Place, Severity};
-use crate::locate::Intervals;
+use crate::locate::{Intervals, LocateInput};
 use crate::model::{CounterHistory, Device, NetworkModel, Rise};
 
 /// The page.
@@ -43,7 +46,7 @@ const AROUND: Span = Span::s(2);
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     let model = view.model;
     let traffic = &model.traffic;
-    let destroyed = destroyed(model);
+    let destroyed = destroyed(view);
     let counted = |rises: &[&Rise]| -> u64 { rises.iter().map(|rise| rise.difference.rise).sum() };
     let seen = traffic.foreign.first();
     let firsts =
@@ -66,7 +69,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
     for (device, rises) in &destroyed {
         let Some(rise) = rises.last() else { continue };
         let text = format!(
-            "{} destroyed {} frames in its processing unit, and no port counted a damaged one",
+            "{} destroyed {} frames in its processing unit, and no port before it counted a damaged one",
             model.label(device.id),
             counted(rises)
         );
@@ -96,29 +99,53 @@ fn may_be_old(device: &Device) -> bool {
 }
 
 /// Who destroyed frames that were not damaged, with the rises that show it.
-fn destroyed(model: &NetworkModel) -> Vec<(&Device, Vec<&Rise>)> {
-    let found = |device| {
-        let track = CounterHistory::track(device, ErrorCounter::ProcessingUnit);
+fn destroyed<'v>(view: &View<'v>) -> Vec<(&'v Device, Vec<&'v Rise>)> {
+    let model = view.model;
+    let found = |device: &'v Device| {
+        let track = CounterHistory::track(&device.counters, ErrorCounter::ProcessingUnit);
         track.into_iter().flat_map(|track| &track.rises)
     };
-    if model.devices.iter().all(|device| found(&device.counters).next().is_none()) {
+    let counting = || model.devices.iter().filter(|device| found(device).next().is_some());
+    if counting().next().is_none() {
         return Vec::new();
     }
-    let explained = explained(model);
-    let is_clean =
-        |rise: &&Rise| !explained.meet((rise.after_time.before(AROUND), rise.at + AROUND));
-    let clean = model
-        .devices
-        .iter()
-        .map(|device| (device, found(&device.counters).filter(is_clean).collect::<Vec<_>>()));
-    clean.filter(|(_, rises)| !rises.is_empty()).collect()
+    let wiring = LocateInput::of(model, view.has_ended);
+    let all = counting().map(|device| {
+        let explained = explained(model, wiring.as_ref(), device.id.index());
+        let is_clean =
+            |rise: &&Rise| !explained.meet((rise.after_time.before(AROUND), rise.at + AROUND));
+        (device, found(device).filter(is_clean).collect::<Vec<_>>())
+    });
+    all.filter(|(_, rises)| !rises.is_empty()).collect()
 }
 
-/// When processing units find errors for another reason: damage at a port anywhere, or a link that comes or goes.
-fn explained(model: &NetworkModel) -> Intervals {
+/// When the processing unit of a controller finds errors for another reason: damage at a port before it, on the way that
+/// frames take, or a link that comes or goes. Damage behind it cannot be what it finds.
+fn explained(model: &NetworkModel, wiring: Option<&LocateInput<'_>>, node: usize) -> Intervals {
+    let before: Option<BTreeSet<(usize, Port)>> = wiring.and_then(|wiring| {
+        let ways = wiring.routes().iter().map(|route| {
+            let after = route.processing_of(node).map(|unit| unit.after)?;
+            let checks = route.checks().take_while(move |check| check.hop <= after);
+            Some(checks.map(|check| (check.node, check.port)))
+        });
+        // Who is cut off is reached by one card of a ring alone.
+        let known: Vec<_> = ways.flatten().collect();
+        (!known.is_empty()).then(|| known.into_iter().flatten().collect())
+    });
+    let is_before = |at: usize, counter: ErrorCounter| match (counter, &before) {
+        (ErrorCounter::ProcessingUnit | ErrorCounter::Pdi, _) => false,
+        (
+            ErrorCounter::InvalidFrame(port)
+            | ErrorCounter::PhysicalLayer(port)
+            | ErrorCounter::Forwarded(port),
+            Some(before),
+        ) => before.contains(&(at, port)),
+        (_, Some(_) | None) => true,
+    };
     let devices = || model.devices.iter();
-    let tracks = devices().flat_map(|device| device.counters.tracks()).filter(|(counter, _)| {
-        !matches!(counter, ErrorCounter::ProcessingUnit | ErrorCounter::Pdi)
+    let tracks = devices().flat_map(|device| {
+        let tracks = device.counters.tracks();
+        tracks.filter(move |(counter, _)| is_before(device.id.index(), *counter))
     });
     let rises = tracks.flat_map(|(_, track)| &track.rises).map(|rise| (rise.after_time, rise.at));
     let links =

@@ -163,6 +163,9 @@ impl Learner {
         if let Some(passed) = passed {
             self.addresses.passed(model, answer.sent_by, passed, is_counted_twice);
         }
+        if answer.own > 0 && answer.effect.reads && !answer.effect.writes {
+            registers::broadcast_read(model, answer);
+        }
         if !answer.is_last {
             return;
         }
@@ -194,9 +197,6 @@ impl Learner {
         }
         if answer.sum == 0 {
             return;
-        }
-        if answer.effect.reads && !answer.effect.writes {
-            registers::broadcast_read(model, answer);
         }
         if answer.effect.writes && !answer.effect.reads {
             self.addresses.broadcast_written(model, answer);

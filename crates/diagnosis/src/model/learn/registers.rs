@@ -192,7 +192,8 @@ pub(super) fn broadcast_read(model: &mut NetworkModel, answer: &Answer<'_>) {
     let Some(status) = al_status(answer.reply.data(), answer.ado) else { return };
     let states = AlState::from_or(status.0 as u8);
     model.traffic.broadcasts.record_state(states.highest());
-    let everybody = usize::from(answer.sum) == model.devices.len();
+    // In a ring that is open each copy holds the states of its own half.
+    let everybody = usize::from(answer.own) == model.devices.len();
     let (Some(state), true, false) = (states.all_in(), everybody, states.any_error()) else {
         return;
     };

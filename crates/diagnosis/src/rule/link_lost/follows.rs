@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
+use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Span;
 use linesman_proto::topology::{End, Tree};
 
 use super::ends;
 use crate::finding::Symptom;
 use crate::locate::LinkLosses;
-use crate::model::NetworkModel;
+use crate::model::{Rise, NetworkModel};
 
 /// No link of a device that starts anew comes up so much later than the others.
 const SLOWEST_LINK_UP: Span = Span::s(5);
@@ -31,7 +32,12 @@ pub(in crate::rule) fn follows(model: &NetworkModel, tree: &Tree, link: usize) -
         }
     }
     if let End::Controller(node, _) = tree.links()[link].downstream {
-        follows.extend(lost_beyond(model, tree, link, node));
+        let all = LinkLosses::all(model);
+        let own = all.iter().find(|drops| drops.link == link);
+        let is_powered = own.is_some_and(|own| kept_power(model, tree, own));
+        if let Some(own) = own.filter(|_| !is_powered) {
+            follows.extend(lost_beyond(tree, &all, own, node));
+        }
         for &node in tree.subtree(node) {
             let id = DeviceId(node as u32);
             follows.extend([
@@ -41,7 +47,9 @@ pub(in crate::rule) fn follows(model: &NetworkModel, tree: &Tree, link: usize) -
                 Symptom::Emergency(id),
             ]);
             // If it is the device that failed, those behind it lost their links, too.
-            follows.extend(Port::ALL.map(|port| Symptom::LinkCounted(id, port)));
+            if !is_powered {
+                follows.extend(Port::ALL.map(|port| Symptom::LinkCounted(id, port)));
+            }
         }
     }
     follows.into_iter().collect()
@@ -49,10 +57,8 @@ pub(in crate::rule) fn follows(model: &NetworkModel, tree: &Tree, link: usize) -
 
 /// The links beyond the device behind a lost one, as far as they were lost with it: then it was without
 /// supply. Those that were lost more often, or before, or that stay away for much longer have trouble of their own.
-fn lost_beyond(model: &NetworkModel, tree: &Tree, link: usize, behind: usize) -> Vec<Symptom> {
-    let all = LinkLosses::all(model);
+fn lost_beyond(tree: &Tree, all: &[LinkLosses], own: &LinkLosses, behind: usize) -> Vec<Symptom> {
     let of = |link: usize| all.iter().find(|drops| drops.link == link);
-    let Some(own) = of(link) else { return Vec::new() };
     let mut lost = Vec::new();
     for (port, child) in tree.children(behind) {
         let beyond = tree.link_above(child).and_then(of);
@@ -69,4 +75,15 @@ fn lost_beyond(model: &NetworkModel, tree: &Tree, link: usize, behind: usize) ->
         }
     }
     lost
+}
+
+/// True if the device behind a lost link had its supply all the time: it counted each of the losses itself, and its
+/// controller, whose counters start from 0, has not started anew.
+fn kept_power(model: &NetworkModel, tree: &Tree, own: &LinkLosses) -> bool {
+    let End::Controller(node, entry) = tree.links()[own.link].downstream else { return false };
+    let device = &model.devices[node];
+    let lost = device.counters.track(ErrorCounter::LostLink(entry));
+    let since = |rise: &&Rise| rise.at >= own.first;
+    let counted = lost.map(|track| track.rises.iter().filter(since).map(|rise| rise.difference.rise));
+    !device.has_restarted() && counted.is_some_and(|rises| rises.sum::<u64>() >= own.count)
 }

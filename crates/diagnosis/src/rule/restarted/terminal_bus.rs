@@ -33,9 +33,16 @@ fn feeder(model: &NetworkModel, tree: &Tree, node: usize) -> Option<usize> {
     Some(node)
 }
 
-/// True if it fell with them, or was away meanwhile: its state may not have been read before it went again.
+/// True if it fell with them, or was away meanwhile: its state may not have been read before it went again. Who was cut
+/// off behind one that fell, and came back with its station address and a state above INIT, had its supply.
 fn has_gone(model: &NetworkModel, node: usize, together: &[Fall<'_>]) -> bool {
     let device = &model.devices[node];
+    let latest = together.iter().map(|fall| fall.change.at).max();
+    let has_kept = !device.has_restarted()
+        && device.al.status.is_some_and(|status| Some(status.at) >= latest);
+    if has_kept {
+        return false;
+    }
     let is_away_with = |fall: &Fall<'_>| {
         device.absences.iter().any(|absence| {
             absence.since.at.before(TOGETHER) <= fall.change.at
