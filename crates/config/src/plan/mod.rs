@@ -18,6 +18,7 @@ pub mod reference;
 pub mod settings;
 mod shift;
 pub mod task;
+pub mod time_source;
 pub mod timing;
 pub mod variable;
 
@@ -51,6 +52,7 @@ pub use settings::{
 };
 pub use shift::ShiftReference;
 pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};
+pub use time_source::{StampPair, TimeSource, TimeStamps};
 pub use variable::Variable;
 
 /// A SubDevice that the plan is made for.
@@ -96,6 +98,12 @@ pub struct Plan {
     /// How far a clock may be off the reference clock (0x092C) before that is told (DC-21); `None`: as far as
     /// the MainDevice lets it be before OP.
     pub sync_window: Option<Span>,
+    /// Whose time the network has; `None`: its reference clock's, unless another network of the process leads.
+    pub time_source: Option<TimeSource>,
+    /// Where the time stamps of the SubDevice lie that tells the time outside, if there is one.
+    pub time_stamps: Option<TimeStamps>,
+    /// The base time: cycles and earlier fetches are whole numbers of it (SYN-16).
+    pub base_tick: Span,
     /// Ports whose link was lost stay closed until they are ordered to open (JCT-12).
     pub ports_open_by_order: bool,
     /// Groups that join and leave while the network runs.
@@ -189,6 +197,9 @@ impl Plan {
             outputs_shift: None,
             inputs_shift_ns: None,
             sync_window: None,
+            time_source: None,
+            time_stamps: None,
+            base_tick: Span::ms(1),
             ports_open_by_order: false,
             groups: Vec::new(),
         }

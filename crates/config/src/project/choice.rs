@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::plan::layout::{Grouping, PlanOptions, TaskOptions};
 use crate::plan::{ClockSettings, IoAt, OnWrongCounter, ProcessAccess, WatchdogSettings};
 use crate::profile::ClockMode;
+use crate::project::time::TimeChoice;
 
 /// The network as a whole: table `[network]`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -24,7 +25,7 @@ pub struct Network {
     pub on_wrong_counter: OnWrongCounter,
     /// Read in every cycle which mailboxes hold something, instead of asking each now and then.
     pub mailbox_states: bool,
-    /// The unit of `pre_ticks`, in µs.
+    /// The unit of `pre_ticks`, and the base tick that programs are told the time of, in µs.
     #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub base_time_us: u32,
     /// A SubDevice that left its state is brought back, unless it says otherwise; else it stays there until somebody asks for
@@ -50,6 +51,13 @@ pub struct Network {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub sync_window_ns: Option<u32>,
+    /// Whose time the network has. Unless said that of its reference clock, or that of another network of the same
+    /// process that leads; with a terminal for IEEE 1588 the one that it tells.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_source: Option<TimeChoice>,
+    /// With `time_source = "device"`: the device that tells the time. Unless said the only one that can.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_device: Option<String>,
     /// A port whose link was lost stays closed when the link is back, until the MainDevice has prepared the
     /// section behind it and orders it to open; else it opens by itself, at once.
     pub ports_open_by_order: bool,
@@ -71,6 +79,8 @@ impl Default for Network {
             outputs_shift_us: None,
             inputs_shift_us: None,
             sync_window_ns: None,
+            time_source: None,
+            time_device: None,
             ports_open_by_order: false,
         }
     }
@@ -142,6 +152,7 @@ impl Network {
             mailbox_states: self.mailbox_states,
             outputs_shift: self.outputs_shift_us.map(|us| Span::us(u64::from(us))),
             inputs_shift_ns: self.inputs_shift_us.map(|us| i64::from(us) * 1_000),
+            base_tick: Span::us(u64::from(self.base_time_us)),
             sync_window: self.sync_window_ns.map(|ns| Span::ns(u64::from(ns))),
             ports_open_by_order: self.ports_open_by_order,
             ..PlanOptions::default()

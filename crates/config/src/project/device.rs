@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     ClockChoice, Description, IdentificationChoice, Mapping, ProjectError, StartUpEntry,
-    WatchdogChoice, inline, quoted,
+    SyncLeader, TimeStampForm, WatchdogChoice, inline, quoted,
 };
 use crate::attachment::Attachment;
 use crate::compare::Wanted;
@@ -108,6 +108,13 @@ pub struct ProjectDevice {
     /// is that of its description.
     #[serde(default)]
     pub sync_times: SyncTimes,
+    /// The form of the time stamps that it exchanges, where it is a bridge or a terminal for IEEE 1588; it selects the
+    /// PDO. As its description has it unless said, and 64 bits where the network takes its time from it.
+    #[serde(default)]
+    pub time_stamps: Option<TimeStampForm>,
+    /// Of a bridge: the side whose network leads. Written to 0x10F5:01.
+    #[serde(default)]
+    pub sync_leader: Option<SyncLeader>,
     /// PDOs to be assigned, by index, instead of those of its description.
     #[serde(default)]
     pub pdos: Option<Vec<u16>>,
@@ -160,6 +167,8 @@ impl ProjectDevice {
             watchdog: WatchdogChoice::default(),
             clock: None,
             sync_times: SyncTimes::default(),
+            time_stamps: None,
+            sync_leader: None,
             pdos: None,
             mappings: Vec::new(),
             start_up: Vec::new(),
@@ -265,6 +274,8 @@ impl ProjectDevice {
         choice("watchdog", (*watchdog != WatchdogChoice::default()).then(|| inline(watchdog)));
         choice("clock", self.clock.as_ref().map(inline));
         choice("sync_times", (!self.sync_times.is_unknown()).then(|| inline(&self.sync_times)));
+        choice("time_stamps", self.time_stamps.as_ref().map(inline));
+        choice("sync_leader", self.sync_leader.as_ref().map(inline));
         choice("pdos", self.pdos.as_ref().map(inline));
         choice("modules", (!self.modules.is_empty()).then(|| inline(&self.modules)));
         for mapping in &self.mappings {

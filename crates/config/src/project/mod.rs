@@ -22,6 +22,7 @@ pub mod ethernet;
 mod from_esi;
 mod group;
 mod resolve;
+mod time;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -43,6 +44,7 @@ pub use device::ProjectDevice;
 pub use ethernet::EthernetChoice;
 pub use group::{IdentificationChoice, IdentificationWay, ProjectGroup};
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
+pub use time::{SyncLeader, TimeChoice, TimeStampForm};
 
 /// A project.
 #[derive(Clone, PartialEq, Eq, Debug, Deserialize)]
@@ -250,6 +252,7 @@ impl Project {
             }
             device.check()?;
         }
+        self.check_time()?;
         self.check_aliases(&stations)
     }
 

@@ -132,6 +132,7 @@ impl Project {
         }
         let mut options = self.network.options(&self.tasks);
         options.groups = self.planned_groups(&tree, &places);
+        options.time_source = self.planned_time(&places);
         Ok(Resolved { devices, tree: tree.in_processing_order(), options, places })
     }
 
@@ -164,7 +165,14 @@ impl Project {
             profile.type_name.clone_from(&device.type_name);
         }
         map(device, &mut profile, &mut start_up)?;
-        assign(device, &mut profile, &mut start_up)?;
+        let for_time = self.pdos_for_time(device, &profile)?;
+        let pdos = for_time.or_else(|| device.pdos.clone());
+        assign(pdos.as_deref(), &mut profile, &mut start_up)?;
+        self.check_time_stamps(device, &profile)?;
+        if let Some(leader) = device.sync_leader {
+            let comment = "side of the bridge that leads".to_owned();
+            start_up.push(download(0x10F5, 1, vec![leader.code()], comment));
+        }
         profile.measure();
         profile.sync_times = device.sync_times.or(profile.sync_times);
         start_up.extend(device.start_up.iter().filter_map(command));
@@ -305,11 +313,11 @@ const ASSIGNMENT: u16 = 0x1C10;
 
 /// Other PDOs than those of the description.
 fn assign(
-    device: &ProjectDevice,
+    wanted: Option<&[u16]>,
     profile: &mut DeviceProfile,
     start_up: &mut Vec<StartUpCommand>,
 ) -> Result<(), String> {
-    let Some(wanted) = &device.pdos else { return Ok(()) };
+    let Some(wanted) = wanted else { return Ok(()) };
     let all: Vec<MappedPdo> = profile.pdos.drain(..).chain(profile.spare_pdos.drain(..)).collect();
     let by_default = |direction| {
         let managers = profile.process.iter().find(|manager| manager.direction == direction);

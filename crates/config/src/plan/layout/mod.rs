@@ -23,7 +23,7 @@ use self::area::Run;
 use self::group::{Group, groups};
 use super::{
     DatagramPlan, DevicePlan, FramePlan, HotConnectGroup, IoAt, Ownership, Plan, PlannedDevice,
-    Role, SyncUnit, Task,
+    Role, SyncUnit, Task, TimeSource,
 };
 use crate::profile::ProcessSyncManager;
 
@@ -66,6 +66,10 @@ pub struct PlanOptions {
     pub inputs_shift_ns: Option<i64>,
     /// How far a clock may be off the reference clock before that is told, where that is chosen.
     pub sync_window: Option<Span>,
+    /// Whose time the network has, where that is chosen.
+    pub time_source: Option<TimeSource>,
+    /// The base time: cycles and earlier fetches are whole numbers of it.
+    pub base_tick: Span,
     /// Ports whose link was lost open by order only.
     pub ports_open_by_order: bool,
     /// Groups that join and leave while the network runs.
@@ -86,6 +90,8 @@ impl Default for PlanOptions {
             outputs_shift: None,
             inputs_shift_ns: None,
             sync_window: None,
+            time_source: None,
+            base_tick: Span::ms(1),
             ports_open_by_order: false,
             groups: Vec::new(),
         }
@@ -196,6 +202,7 @@ impl Plan {
             outputs_shift: options.outputs_shift,
             inputs_shift_ns: options.inputs_shift_ns,
             sync_window: options.sync_window,
+            base_tick: options.base_tick,
             ports_open_by_order: options.ports_open_by_order,
             groups: options.groups.clone(),
             ..Self::empty(tree)
@@ -227,6 +234,7 @@ impl Plan {
         }
         extra::settle_mailbox_fmmus(&mut plan);
         plan.name_variables(devices);
+        plan.take_time_source(options.time_source, devices);
         Ok(plan)
     }
 }
