@@ -96,6 +96,7 @@ impl Plan {
         }
         self.ethernet_addresses(&mut doubts);
         self.reference(&mut doubts);
+        doubts.extend(self.time_source_doubt());
         self.units(&mut doubts);
         self.ports(&mut doubts);
         self.groups(&mut doubts);

@@ -52,7 +52,7 @@ pub use settings::{
 };
 pub use shift::ShiftReference;
 pub use task::{DatagramPlan, FramePlan, IoAt, Ownership, Role, SyncUnit, Task};
-pub use time_source::{StampPair, TimeSource, TimeStamps};
+pub use time_source::{StampPair, TimeSource, TimeStampPlace};
 pub use variable::Variable;
 
 /// A SubDevice that the plan is made for.
@@ -101,7 +101,7 @@ pub struct Plan {
     /// Whose time the network has; `None`: its reference clock's, unless another network of the process leads.
     pub time_source: Option<TimeSource>,
     /// Where the time stamps of the SubDevice lie that tells the time outside, if there is one.
-    pub time_stamps: Option<TimeStamps>,
+    pub time_stamps: Option<TimeStampPlace>,
     /// The base time: cycles and earlier fetches are whole numbers of it (SYN-16).
     pub base_tick: Span,
     /// Ports whose link was lost stay closed until they are ordered to open (JCT-12).

@@ -12,7 +12,7 @@ use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::register::SYSTEM_TIME;
 use linesman_proto::sii::Direction;
 
-use super::{DatagramPlan, FramePlan, Plan, PlannedDevice, Role};
+use super::{DatagramPlan, Doubt, FramePlan, Plan, PlannedDevice, Role, Severity};
 use crate::profile::{DeviceProfile, MappedPdo};
 
 /// Whose time a network has.
@@ -30,7 +30,7 @@ pub enum TimeSource {
 
 /// What the time stamps of a SubDevice are read from, in the inputs of the process image.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub struct TimeStamps {
+pub struct TimeStampPlace {
     /// First byte of the status word; `None` where it is not exchanged.
     status: Option<usize>,
     /// First byte of the time stamp of the network, and of that outside.
@@ -78,7 +78,7 @@ pub fn is_type(type_name: &str, wanted: &str) -> bool {
     type_name.split('-').next() == Some(wanted)
 }
 
-impl TimeStamps {
+impl TimeStampPlace {
     /// The two times; `None` where nothing is connected outside, where this side of the bridge is to lead, or where the
     /// image is too short.
     #[must_use]
@@ -158,6 +158,29 @@ impl Plan {
         }
     }
 
+    /// What keeps the network from having the time that is wanted.
+    pub(super) fn time_source_doubt(&self) -> Option<Doubt> {
+        let source = self.time_source.filter(|source| *source != TimeSource::ReferenceClock)?;
+        let (device, text, advice) = match source {
+            _ if self.datagrams().all(|(.., one)| one.role != Role::ClockShift) => (
+                None,
+                "another time than that of a reference clock is wanted, but no SubDevice uses its clock",
+                "give a SubDevice near the MainDevice a clock (`clock = { reference = true }`), or leave out time_source",
+            ),
+            TimeSource::Device(id) if self.time_stamps.is_none() => (
+                Some(id),
+                "the network is to have the time that a SubDevice tells, but its process data have no time stamps",
+                "give it the PDO with time stamps (`time_stamps = \"bits64\"`)",
+            ),
+            TimeSource::ReferenceClock
+            | TimeSource::Host
+            | TimeSource::Program
+            | TimeSource::Device(_) => return None,
+        };
+        let (severity, name) = (Severity::Warning, "time-source");
+        Some(Doubt { severity, name, device, text: text.to_owned(), advice: advice.to_owned() })
+    }
+
     /// Puts the datagram that writes a time to the reference clock before the one that hands its time round, if there
     /// is none yet. True if there is one now.
     pub fn add_clock_shift(&mut self) -> bool {
@@ -192,7 +215,7 @@ impl Plan {
         false
     }
 
-    fn find_stamps(&self, id: DeviceId, planned: &PlannedDevice) -> Option<TimeStamps> {
+    fn find_stamps(&self, id: DeviceId, planned: &PlannedDevice) -> Option<TimeStampPlace> {
         let byte_of = |subindex: u8| {
             planned.profile.process.iter().find_map(|manager| {
                 let mut bit = 0;
@@ -219,7 +242,7 @@ impl Plan {
         } else {
             PRIMARY_LEADS
         });
-        Some(TimeStamps {
+        Some(TimeStampPlace {
             status: byte_of(SYNC_MODE_ENTRY).map(|(at, _)| at),
             stamps: [internal, external],
             len: if bits > 32 { 8 } else { 4 },
@@ -232,8 +255,12 @@ impl Plan {
 mod tests {
     use super::*;
 
-    const WIDE: TimeStamps =
-        TimeStamps { status: Some(0), stamps: [2, 10], len: 8, leads_itself: Some(PRIMARY_LEADS) };
+    const WIDE: TimeStampPlace = TimeStampPlace {
+        status: Some(0),
+        stamps: [2, 10],
+        len: 8,
+        leads_itself: Some(PRIMARY_LEADS),
+    };
 
     fn image(status: u16, internal: u64, external: u64) -> Vec<u8> {
         [&status.to_le_bytes()[..], &internal.to_le_bytes(), &external.to_le_bytes()].concat()
@@ -249,10 +276,21 @@ mod tests {
         assert_eq!(read(0x8001, 4_500), None, "nothing is connected");
         assert_eq!(WIDE.read(&image(1, 0, 0)), None, "no pair yet");
         assert_eq!(WIDE.read(&[0; 9]), None, "too short");
-        let narrow = TimeStamps { status: None, stamps: [0, 4], len: 4, leads_itself: None };
+        let narrow = TimeStampPlace { status: None, stamps: [0, 4], len: 4, leads_itself: None };
         let bytes = [0xFFFF_FF00_u32.to_le_bytes(), 0x10_u32.to_le_bytes()].concat();
         let expected = StampPair { internal: 0xFFFF_FF00, ahead_ns: 0x110 };
         assert_eq!(narrow.read(&bytes), Some(expected), "the low half goes round");
+    }
+
+    #[test]
+    fn time_that_is_wanted_without_a_clock_is_doubted() {
+        let mut plan = Plan::empty(linesman_proto::topology::Tree::from_wiring(&[], None).unwrap());
+        assert_eq!(plan.time_source_doubt(), None);
+        plan.time_source = Some(TimeSource::Host);
+        let doubt = plan.time_source_doubt().expect("nobody has a clock");
+        assert!(doubt.advice.contains("`clock = { reference = true }`"), "{doubt:?}");
+        plan.time_source = Some(TimeSource::ReferenceClock);
+        assert_eq!(plan.time_source_doubt(), None);
     }
 
     #[test]

@@ -86,6 +86,17 @@ impl Default for Network {
     }
 }
 
+/// What a task is for.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+pub enum TaskPurpose {
+    /// Axes: its frames leave in the beat, when its cycle begins.
+    Motion,
+    /// Logic and I/O: its frames leave when the application has finished, with what that has just set.
+    Logic,
+}
+
 /// A task: `[[task]]`.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -96,9 +107,13 @@ pub struct ProjectTask {
     /// Cycle time in µs.
     #[cfg_attr(feature = "schema", schemars(range(min = 1)))]
     pub cycle_us: u32,
-    /// When its frames leave: when its cycle begins, or when the application has finished.
-    #[serde(default)]
-    pub io_at: IoAt,
+    /// What it is for, which decides when its frames leave where `io_at` is not said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub purpose: Option<TaskPurpose>,
+    /// When its frames leave: when its cycle begins, or when the application has finished. Unless said as its purpose
+    /// has it, and when the cycle begins where that is not said either.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub io_at: Option<IoAt>,
     /// Inputs are fetched in frames of their own, earlier than the others.
     #[serde(default)]
     pub separate_inputs: bool,
@@ -118,11 +133,21 @@ impl ProjectTask {
         Self {
             name: name.to_owned(),
             cycle_us: u32::try_from(cycle.as_nanos() / 1_000).unwrap_or(u32::MAX),
-            io_at: IoAt::default(),
+            purpose: None,
+            io_at: None,
             separate_inputs: false,
             pre_ticks: 0,
             repeats: 0,
         }
+    }
+
+    /// When its frames leave: as is said, else as its purpose has it, else when its cycle begins (SYN-13).
+    #[must_use]
+    pub fn io_at(&self) -> IoAt {
+        self.io_at.unwrap_or(match self.purpose {
+            None | Some(TaskPurpose::Motion) => IoAt::TaskBegin,
+            Some(TaskPurpose::Logic) => IoAt::TaskEnd,
+        })
     }
 
     /// The same for the planner.
@@ -132,7 +157,7 @@ impl ProjectTask {
         TaskOptions {
             name: self.name.clone(),
             cycle: Span::us(u64::from(self.cycle_us)),
-            io_at: self.io_at,
+            io_at: self.io_at(),
             separate_inputs: self.separate_inputs.then(|| Span::us(ahead)),
             repeats: self.repeats,
         }

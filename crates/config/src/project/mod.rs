@@ -35,7 +35,9 @@ use crate::attachment::Attachment;
 use crate::inventory::Inventory;
 use crate::plan::AddressingChoice;
 
-pub use choice::{ClockChoice, Mapping, Network, ProjectTask, StartUpEntry, WatchdogChoice};
+pub use choice::{
+    ClockChoice, Mapping, Network, ProjectTask, StartUpEntry, TaskPurpose, WatchdogChoice,
+};
 pub use description::{
     DescribedEntry, DescribedMailbox, DescribedPdo, DescribedSyncManager, Description, FmmuWord,
     Way,
