@@ -92,6 +92,16 @@ pub(super) const TYPES: &[LibraryType] = &[
         ports: [Mii, Mii, Mii, Mii],
         ..JUNCTION
     }]),
+    // What of a port multiplier is a SubDevice: the first one of each network behind it. Its clock is the same in all of
+    // them. Its process data are left out.
+    single(&[Spec {
+        name: "CU2508",
+        title: "CU2508 real-time Ethernet port multiplier",
+        product: 0x09CC_5432,
+        revision: 0x0011_0000,
+        ports: [Mii, Mii, Absent, Absent],
+        ..JUNCTION
+    }]),
     LibraryType {
         controllers: &[
             Spec {

@@ -152,7 +152,7 @@ fn another_revision_shows_in_identity_and_dictionary() {
 #[test]
 fn couplers_and_junctions_have_the_ports_of_their_data_sheets() {
     use Port::{A, B, C, D};
-    let table: [(&str, &[&[Port]]); 13] = [
+    let table: [(&str, &[&[Port]]); 14] = [
         ("EL1008", &[&[A, B]]),
         ("EL3104", &[&[A, B]]),
         ("EK1100", &[&[A, B, C]]),
@@ -163,6 +163,7 @@ fn couplers_and_junctions_have_the_ports_of_their_data_sheets() {
         ("EK1561", &[&[A, C, D]]),
         ("EK1122", &[&[A, B, C, D]]),
         ("EP1122-0001", &[&[A, B, C, D]]),
+        ("CU2508", &[&[A, B]]),
         ("CU1123", &[&[A, B, C]]),
         ("CU1124", &[&[A, B, C, D]]),
         ("CU1128", &[&[A, B, C, D], &[A, B, C, D], &[A, B, C, D]]),

@@ -482,7 +482,7 @@ fn mode(wanted: u64, supported: u64, activation: u8) -> Result<SyncMode, AlStatu
 mod tests {
     use super::*;
 
-    // proves: SYN-01 partial: what follows from objects and registers
+    // proves: SYN-01 (U)
     #[test]
     fn the_mode_follows_from_objects_and_unit() {
         let all = FREE_RUN | WITH_FRAMES | WITH_CLOCK;
