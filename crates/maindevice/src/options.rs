@@ -4,6 +4,8 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::state::StateTimeouts;
 use linesman_proto::time::{DcTime, Span};
 
+use crate::network_group::NetworkGroup;
+
 /// Choices for one network.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -46,6 +48,9 @@ pub struct Options {
     ///
     /// [`Instant`]: linesman_proto::time::Instant
     pub clock_epoch: DcTime,
+    /// The networks of this process that keep one time, if this one is to be among them: the first that starts leads,
+    /// the others follow, unless the plan says whose time a network has.
+    pub group: Option<NetworkGroup>,
     /// So many frames with the time of the reference clock are sent to compensate the drift of all
     /// clocks before SubDevices that use them leave PREOP.
     pub drift_frames: u32,
@@ -151,6 +156,7 @@ impl Default for Options {
             reinitialise: true,
             hold_at: None,
             clock_epoch: DcTime(0),
+            group: None,
             drift_frames: 15_000,
             clock_limit: Span::us(1),
             clock_patience: Span::s(10),

@@ -8,6 +8,8 @@
 
 use linesman_proto::time::{DcTime, Instant, Span};
 
+use crate::network_group::SPEED_PLACES;
+
 /// So much of the phase is corrected each cycle: 1/16.
 const PROPORTIONAL: i64 = 16;
 /// And so much is learnt of the speed: 1/512.
@@ -34,11 +36,25 @@ pub(super) struct DcServo {
 }
 
 impl DcServo {
-    /// The reference was set, for the how-maniest time, to a time that was `epoch` when the run began.
-    pub(super) fn set_base(&mut self, base: Option<(u32, DcTime)>) {
-        if self.base != base {
+    /// The reference was set, for the how-maniest time, to a time that was `epoch` when the run began. True if that is
+    /// news.
+    pub(super) fn set_base(&mut self, base: Option<(u32, DcTime)>) -> bool {
+        let is_news = self.base != base;
+        if is_news {
             *self = Self { base, ..Self::default() };
         }
+        is_news
+    }
+
+    /// How much faster the reference goes than this computer, in 2^-48, for a cycle of this length.
+    pub(super) fn speed(&self, cycle: Span) -> i64 {
+        let cycle = i128::from(cycle.as_nanos().max(1)) * i128::from(INTEGRAL);
+        ((-i128::from(self.speed) << SPEED_PLACES) / cycle) as i64
+    }
+
+    /// The reference's time in the last frame that brought it, all of it.
+    pub(super) fn shown(&self) -> Option<u64> {
+        self.time.map(|(_, time)| time as u64)
     }
 
     /// By how many ns the next batches are to be moved, from the low half of the reference's time

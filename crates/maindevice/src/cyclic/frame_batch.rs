@@ -14,6 +14,8 @@ pub(super) const LOST_IS_NEWS: u64 = 3;
 #[derive(Debug)]
 pub(super) struct FrameBatch {
     pub(super) next_at: Instant,
+    /// When it was due the last time.
+    pub(super) began_at: Instant,
     pub(super) cycle: Span,
     /// Their places among all frames.
     pub(super) frames: Range<usize>,
@@ -55,6 +57,7 @@ pub(super) fn frame_batches(
             let batch = batches.iter().position(same).unwrap_or_else(|| {
                 batches.push(FrameBatch {
                     next_at,
+                    began_at: next_at,
                     cycle: one.cycle.max(Span::ns(1)),
                     frames: 0..0,
                     out: 0,
@@ -91,6 +94,7 @@ impl FrameBatch {
     #[inline]
     pub(super) fn depart(&mut self, now: Instant) -> u64 {
         self.out = self.frames.end - self.frames.start;
+        self.began_at = self.next_at;
         self.next_at += self.cycle;
         if self.next_at <= now { self.catch_up(now) } else { 0 }
     }
@@ -99,6 +103,7 @@ impl FrameBatch {
     fn catch_up(&mut self, now: Instant) -> u64 {
         let behind = now.since(self.next_at).as_nanos() / self.cycle.as_nanos() + 1;
         self.next_at += self.cycle * behind;
+        self.began_at = self.next_at.before(self.cycle);
         behind
     }
 

@@ -8,7 +8,8 @@
 //!
 //! [`send`] sends, [`receive`] takes in, [`copy_range`] copies, [`datagram`] judges, [`quality`] tells how good
 //! and how old data are, [`application`] sees to it that old outputs are not sent as fresh ones, [`system_time_distribution`]
-//! that clocks follow the reference clock and nothing else, [`dc_servo`] that the cycle does.
+//! that clocks follow the reference clock and nothing else, [`dc_servo`] that the cycle does, [`network_time`] tells
+//! programs that time, [`led_time`] leads the reference clock itself where it is not left alone.
 //!
 //! A frame that leaves or comes back is found once: all that sending and receiving need of it is in its
 //! [`Frame`], all that is shared with those that leave together in their [`FrameBatch`].
@@ -18,6 +19,8 @@ mod copy_range;
 mod datagram;
 mod dc_servo;
 mod frame_batch;
+mod led_time;
+mod network_time;
 mod quality;
 mod receive;
 mod send;
@@ -31,21 +34,26 @@ use linesman_config::plan::expect::Presence;
 use linesman_config::plan::{FramePlan, Plan};
 use linesman_proto::address::WorkingCounter;
 use linesman_proto::sii::Direction;
-use linesman_proto::time::Instant;
+use linesman_proto::time::{DcTime, Instant};
 
 use self::application::Application;
 use self::copy_range::CopyRanges;
 use self::datagram::{Datagram, clear_lost};
 use self::dc_servo::DcServo;
 use self::frame_batch::{BatchFrame, FrameBatch, earliest, frame_batches};
+use self::led_time::LedTime;
+use self::network_time::{NetworkTime, base_tick};
 use self::quality::Share;
-use self::system_time_distribution::{ClockDatagram, SystemTimeDistribution};
+use self::system_time_distribution::{ClockDatagram, ClockShiftDatagram, SystemTimeDistribution};
 use crate::exchange::Exchange;
 use crate::exchange::prebuilt::{Prebuilt, data_offsets};
 use crate::executor::lock;
 use crate::mailbox::{MailboxBits, MailboxQueues};
+use crate::network_group::{GroupLead, NetworkGroup};
 use crate::supervisor::DeviceTable;
 
+pub use self::led_time::OutsideTime;
+pub use self::network_time::TaskTimes;
 pub use self::quality::{FrameStatus, Quality};
 
 /// One frame of the plan.
@@ -61,6 +69,8 @@ struct Frame {
     datagrams: Vec<Datagram>,
     /// The datagram that hands round the time of the reference clock.
     clock: Option<ClockDatagram>,
+    /// The datagram that leads the reference clock.
+    clock_shift: Option<ClockShiftDatagram>,
     /// More is to be done with it before it leaves than with most: it has such a datagram, or copies follow.
     more: bool,
     /// Bits of the datagrams that carry outputs, and of all.
@@ -111,6 +121,10 @@ pub(crate) struct Cyclic {
     shares: Vec<Share>,
     time_distribution: SystemTimeDistribution,
     dc_servo: DcServo,
+    network_time: NetworkTime,
+    led_time: Option<LedTime>,
+    /// It leads other networks of the process.
+    lead: Option<Arc<GroupLead>>,
     mailboxes: MailboxBits,
     pub(crate) outputs: Vec<u8>,
     pub(crate) inputs: Vec<u8>,
@@ -151,6 +165,9 @@ impl Cyclic {
             shares: quality::shares(&plan, &order),
             time_distribution: SystemTimeDistribution::default(),
             dc_servo: DcServo::default(),
+            network_time: NetworkTime::default(),
+            led_time: None,
+            lead: None,
             mailboxes: MailboxBits::default(),
             outputs: vec![0; plan.outputs_len],
             inputs: vec![0; plan.inputs_len],
@@ -165,6 +182,37 @@ impl Cyclic {
     /// Tells those who serve mailboxes which of them hold something, where the plan reads that.
     pub(crate) fn serve(&mut self, mailboxes: MailboxQueues) {
         self.mailboxes = MailboxBits::new(&self.plan, mailboxes);
+    }
+
+    /// Leads its reference clock to the time that the plan wants, or that of the group that it follows.
+    pub(crate) fn lead_reference(&mut self, follows: Option<NetworkGroup>, epoch: DcTime) {
+        let (source, stamps) = (self.plan.time_source, self.plan.time_stamps);
+        self.led_time = LedTime::new(source, stamps, follows, epoch);
+        if self.led_time.is_none() && source.is_none() {
+            // What another tool has planned goes out as it was planned.
+            self.frames.iter_mut().for_each(|frame| frame.clock_shift = None);
+        }
+    }
+
+    /// Leads other networks of the process.
+    pub(crate) fn lead_group(&mut self, lead: Option<Arc<GroupLead>>) {
+        self.lead = lead;
+    }
+
+    /// A program tells a time outside that was at `at`.
+    pub(crate) fn take_outside_time(&mut self, at: Instant, time: DcTime) {
+        let cycle = self.plan.tasks.first().map(|task| task.cycle).unwrap_or_default();
+        let network = self.network_time.at(at);
+        if let (Some(led), Some(network), None) =
+            (&mut self.led_time, network, self.plan.time_stamps)
+        {
+            led.take_pair(network.0, time.0.wrapping_sub(network.0) as i64, cycle);
+        }
+    }
+
+    /// How far the clock outside is ahead, if there is one.
+    pub(crate) fn outside_time(&self) -> Option<OutsideTime> {
+        self.led_time.as_ref()?.outside()
     }
 
     /// Takes over who is present, if that has changed.
@@ -182,7 +230,12 @@ impl Cyclic {
         device_table.take_changes(&mut self.least, &mut self.most);
         let clock = device_table.clock();
         self.time_distribution.learn(clock);
-        self.dc_servo.set_base(clock.base);
+        if self.dc_servo.set_base(clock.base) {
+            self.network_time.forget();
+            if let Some(led) = &mut self.led_time {
+                led.restart();
+            }
+        }
     }
 
     /// When the next frames are due; [`Instant::MAX`]: never.
@@ -216,6 +269,19 @@ impl Cyclic {
         self.batches.iter().find(begins).map(|one| one.next_at)
     }
 
+    /// The time of the network at a time of the run; `None` before the reference clock has told it.
+    pub(crate) fn network_time(&self, at: Instant) -> Option<DcTime> {
+        self.network_time.at(at)
+    }
+
+    /// When the latest cycle of a task began that has begun by `now`, and the last base tick since then.
+    pub(crate) fn begun(&self, task: usize, now: Instant) -> Option<(Instant, Instant)> {
+        let begins = |one: &&FrameBatch| one.task == task && one.begins;
+        let batch = self.batches.iter().find(begins)?;
+        let start = if batch.next_at <= now { batch.next_at } else { batch.began_at.min(now) };
+        Some((start, base_tick(start, now, batch.cycle, self.plan.base_tick)))
+    }
+
     /// Whether a frame leaves at `now`.
     #[inline]
     pub(crate) fn is_due(&self, now: Instant) -> bool {
@@ -236,7 +302,7 @@ impl Cyclic {
 impl Frame {
     fn new(plan: &Plan, one: &BatchFrame, planned: &FramePlan, prebuilt: Prebuilt) -> Self {
         let (mut outputs, mut datagrams, mut carries) = (CopyRanges::default(), Vec::new(), 0);
-        let mut clock = None;
+        let (mut clock, mut clock_shift) = (None, None);
         for (at, (one, data_at)) in planned.datagrams.iter().zip(data_offsets(planned)).enumerate()
         {
             for owned in one.ownership.iter().filter(|one| one.direction == Direction::Outputs) {
@@ -244,9 +310,10 @@ impl Frame {
                 carries |= FrameStatus::bit(at);
             }
             clock = clock.or(ClockDatagram::new(one, data_at));
+            clock_shift = clock_shift.or(ClockShiftDatagram::new(one, data_at));
             datagrams.push(Datagram::new(plan, one, data_at));
         }
-        let more = clock.is_some() || prebuilt.is_copied();
+        let more = clock.is_some() || clock_shift.is_some() || prebuilt.is_copied();
         Self {
             prebuilt,
             outputs,
@@ -254,6 +321,7 @@ impl Frame {
             not_sent: 0,
             datagrams,
             clock,
+            clock_shift,
             more,
             carries,
             all: FrameStatus::before(planned.datagrams.len()),

@@ -189,7 +189,19 @@ impl Cyclic {
                     let cycle = self.plan.tasks.get(frame.task).map(|task| task.cycle);
                     moved += match self.time_distribution.read(&clock, index, wkc, reply) {
                         Brought::Time => {
-                            self.dc_servo.correction(now, data, cycle.unwrap_or_default())
+                            let cycle = cycle.unwrap_or_default();
+                            let by = self.dc_servo.correction(now, data, cycle);
+                            let departed = self.time_distribution.departed();
+                            if let Some((departed, time)) = departed.zip(self.dc_servo.shown()) {
+                                let speed = self.dc_servo.speed(cycle);
+                                self.network_time.take(departed, time, speed);
+                                if let Some((lead, pair)) =
+                                    self.lead.as_ref().zip(self.network_time.pair())
+                                {
+                                    lead.tell(pair);
+                                }
+                            }
+                            by
                         }
                         Brought::Nothing => self.dc_servo.as_before(cycle.unwrap_or_default()),
                     };

@@ -65,7 +65,7 @@ impl Cyclic {
     /// What few frames need: the time of the reference clock, and to be kept for the copies that follow.
     #[inline(never)]
     fn complete(&mut self, index: usize, number: u32, exchange: &mut Exchange, sent: &mut [u8]) {
-        let Self { frames, batches, time_distribution, deadline, .. } = self;
+        let Self { frames, batches, time_distribution, deadline, network_time, .. } = self;
         let Some(frame) = frames.get(index) else { return };
         let batch = batches.get(frame.batch);
         let mut second_copy = None;
@@ -73,6 +73,13 @@ impl Cyclic {
             let [first, ..] = number.to_le_bytes();
             let departed = deadline.before(batch.cycle);
             second_copy = time_distribution.write(clock, first, departed, sent);
+        }
+        if let (Some(shift), Some(batch)) = (&frame.clock_shift, batch) {
+            let departed = deadline.before(batch.cycle);
+            let led = self.led_time.as_mut().filter(|_| time_distribution.is_handed());
+            let time =
+                led.and_then(|led| led.time(departed, network_time, &self.inputs, batch.cycle));
+            shift.write(time, sent);
         }
         if frame.prebuilt.is_copied() {
             exchange.keep_copies(index as u32, number, sent, second_copy);

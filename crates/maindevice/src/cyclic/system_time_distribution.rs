@@ -125,6 +125,36 @@ const fn reading(command: Command) -> Option<Command> {
     }
 }
 
+/// The datagram of a frame that writes a time to the reference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ClockShiftDatagram {
+    /// Where its data begin in the frame, and how many of them are a time.
+    data_at: usize,
+    len: usize,
+}
+
+impl ClockShiftDatagram {
+    /// The one that is planned, if it is one whose data begin at `data_at`.
+    pub(super) fn new(planned: &DatagramPlan, data_at: usize) -> Option<Self> {
+        let is_time = planned.role == Role::ClockShift && planned.len >= size_of::<u32>();
+        is_time.then_some(Self { data_at, len: planned.len.min(size_of::<u64>()) })
+    }
+
+    /// Puts the time into a frame that is about to leave; without one it is addressed to nobody.
+    pub(super) fn write(&self, time: Option<u64>, frame: &mut [u8]) {
+        let (command, time) = match time {
+            Some(time) => (Command::Fpwr, time),
+            None => (Command::Nop, 0),
+        };
+        if let Some(code) = frame.get_mut(self.data_at - DATAGRAM_HEADER_LEN) {
+            *code = command.code();
+        }
+        if let Some(data) = frame.get_mut(self.data_at..self.data_at + self.len) {
+            data.copy_from_slice(&time.to_le_bytes()[..self.len]);
+        }
+    }
+}
+
 /// What was sent in a frame.
 #[derive(Clone, Copy, Debug, Default)]
 struct SentTime {
@@ -254,6 +284,16 @@ impl SystemTimeDistribution {
         }
         self.last = Some((sent.departed, time));
         Brought::Time
+    }
+
+    /// True while the reference gives its time, which was set, and all others follow it.
+    pub(super) fn is_handed(&self) -> bool {
+        self.known.stands && self.known.base.is_some() && self.state == ReferenceState::Handed
+    }
+
+    /// When the latest frame left that brought the reference's time.
+    pub(super) fn departed(&self) -> Option<Instant> {
+        self.last.map(|(departed, _)| departed)
     }
 
     /// What the reference shows in a frame that leaves at `departed`.

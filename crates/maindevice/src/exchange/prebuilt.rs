@@ -185,7 +185,16 @@ impl Prebuilt {
                 Addressing::Station | Addressing::Logical | Addressing::None => SAME,
             };
             // What hands the reference's time round is a mere read at times, and another one's at others.
-            let free = if role == Role::ReferenceClock { COMMAND | ADP } else { 0 };
+            let free = match role {
+                Role::ReferenceClock => COMMAND | ADP,
+                // And nobody is led while there is no time to lead to.
+                Role::ClockShift => COMMAND,
+                Role::ProcessData
+                | Role::Presence
+                | Role::LatchedTime
+                | Role::MailboxStates
+                | Role::Other => 0,
+            };
             let masks = commands.map(|command| mask(command) & !free);
             DatagramShape { at: header, heads: commands.map(variant), masks }
         };
@@ -212,7 +221,8 @@ impl Prebuilt {
         // Command and index are compared anyway.
         let heads = shapes.iter().map(|shape| shape.at..shape.at + 2);
         let clocks = plan.datagrams.iter().zip(data_offsets(plan));
-        let clocks = clocks.filter(|(one, _)| one.role == Role::ReferenceClock);
+        let is_clock = |role| matches!(role, Role::ReferenceClock | Role::ClockShift);
+        let clocks = clocks.filter(|(one, _)| is_clock(one.role));
         let times = clocks.flat_map(|(one, data)| {
             let adp = data - DATAGRAM_HEADER_LEN + 2;
             [adp..adp + 2, data..data + one.len]

@@ -178,6 +178,7 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
         options: Arc::new(Options::default()),
         mailboxes: mailboxes.clone(),
         bad_rounds: Arc::default(),
+        follows: None,
     };
     let mut pending = pin!(mailboxes.ask(ID, request));
     wire.spawn(serve_mailbox(context, ID));

@@ -15,6 +15,7 @@ use crate::exchange::Target;
 use crate::executor::{Handle, Wire, lock};
 use crate::mailbox::queue::Pending;
 use crate::mailbox::{MailboxQueues, MailboxRequest, ProtocolError, ProtocolErrors};
+use crate::network_group::NetworkGroup;
 use crate::procedure::scan::ScanCache;
 use crate::procedure::{read_only_scan, scan, state};
 use crate::service::{self, Service, ServiceContext, ServiceFailure, ServiceOnly, ServiceTicket};
@@ -71,9 +72,10 @@ impl MainDevice {
     ///
     /// It begins with clearing the station addresses of all SubDevices, then gives those of the plan.
     /// A SubDevice that is not who the plan says, or that the plan does not have, is left alone.
-    pub fn start(&mut self, now: Instant, plan: Plan) {
+    pub fn start(&mut self, now: Instant, mut plan: Plan) {
         let scan_cache = lock(&self.scan_cache).take();
         let wire = self.command();
+        let follows = self.join_group(&mut plan);
         let plan = Arc::new(plan);
         let mut device_table = DeviceTable::new(&plan);
         device_table.set_hold(self.options.hold_at);
@@ -88,16 +90,33 @@ impl MainDevice {
             options: Arc::clone(&self.options),
             mailboxes: mailboxes.clone(),
             bad_rounds: Arc::default(),
+            follows: follows.clone(),
         };
         wire.spawn(supervisor::supervise(context, scan_cache));
         let allowed = self.options.allowed_misses;
         let (shared, known) = (Arc::clone(&plan), Arc::clone(&device_table));
         let mut cyclic = Cyclic::new(shared, known, &mut self.exchange, allowed, now);
         cyclic.serve(mailboxes.clone());
+        cyclic.lead_reference(follows, self.options.clock_epoch);
+        cyclic.lead_group(self.lead.clone());
         let network_status = NetworkStatus::new(&plan);
         self.running = Some(RunningPlan { cyclic, plan, device_table, mailboxes, network_status });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
+    }
+
+    /// Leads its group, where that has no lead yet; else gives the group that it follows. A network without clocks does
+    /// neither, nor one whose plan says whose time it has.
+    fn join_group(&mut self, plan: &mut Plan) -> Option<NetworkGroup> {
+        let group = self.options.group.as_ref()?;
+        if plan.time_source.is_some() || plan.reference_clock().is_none() {
+            self.lead = None;
+            return None;
+        }
+        if self.lead.is_none() {
+            self.lead = group.lead().map(Arc::new);
+        }
+        (self.lead.is_none() && plan.add_clock_shift()).then(|| group.clone())
     }
 
     /// Asks for a state of one SubDevice of the running plan, or of all; it is kept there from now on.

@@ -160,22 +160,34 @@ pub(crate) async fn set(
 /// together than [`SPACING`] clocks that count in steps of 10 ns learn nothing of their speed. What they
 /// carry is the time that the reference was set to, which was `epoch` when the run began: should it not
 /// answer any more, nobody is led further astray than by the jitter of this computer.
-pub(crate) async fn compensate(wire: &Wire, reference: StationAddress, frames: u32, epoch: DcTime) {
+///
+/// A reference that is led (`is_led`) is taught its speed, too: that time is written to it before.
+pub(crate) async fn compensate(
+    wire: &Wire,
+    reference: StationAddress,
+    frames: u32,
+    is_led: bool,
+    epoch: impl Fn() -> DcTime + Send,
+) {
     let address = DatagramAddress::Physical(reference.0, register::SYSTEM_TIME.address);
     for _ in 0..frames {
         let now = wire.now();
         let next_at = now + SPACING;
-        let expected = epoch.0.wrapping_add(now.as_nanos());
-        let request = Request {
-            command: Command::Frmw,
+        let expected = epoch().0.wrapping_add(now.as_nanos());
+        let request = |command| Request {
+            command,
             address,
             data: DatagramData::from_slice(&expected.to_le_bytes()),
             card: None,
             repeats: 0,
             alone: true,
         };
+        let led = is_led.then(|| wire.submit(request(Command::Fpwr)));
         // A lost one is one less.
-        let _ = wire.submit(request).await;
+        let _ = wire.submit(request(Command::Frmw)).await;
+        if let Some(led) = led {
+            let _ = led.await;
+        }
         wire.sleep_until(next_at).await;
     }
 }

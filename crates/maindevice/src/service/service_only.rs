@@ -35,6 +35,7 @@ impl ServiceOnly {
             options: Arc::clone(options),
             mailboxes: service_only.mailboxes.clone(),
             bad_rounds: Arc::default(),
+            follows: None,
         };
         for device in with_mailbox {
             wire.spawn(serve_mailbox(context.clone(), device.id));

@@ -64,8 +64,9 @@ pub(super) async fn set_all(context: &Context) {
     let outcome = set(context, None).await;
     tell(context, &outcome);
     if let Ok(reference) = outcome {
-        let (frames, epoch) = (context.options.drift_frames, context.options.clock_epoch);
-        clock::compensate(&context.wire, reference, frames, epoch).await;
+        let frames = context.options.drift_frames;
+        let is_led = context.is_led_at_once();
+        clock::compensate(&context.wire, reference, frames, is_led, || context.epoch()).await;
     }
     context.note(Phase::Clocks, began);
     lock(&context.device_table).set_clocks_ready();
@@ -100,7 +101,7 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
         lock(&context.device_table).opened_until = wire.now() + SEEN;
     }
     let Latch { at, clocks } = latched?;
-    let epoch = context.options.clock_epoch;
+    let epoch = context.epoch();
     let reference = choose(&context.plan, &clocks)?;
     let found = |clock: &&SeenClock| clock.station == reference;
     let of_reference = clocks.iter().find(found).cloned();

@@ -29,14 +29,15 @@ mod watched_clock;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex};
 
-use linesman_config::plan::{AddressingChoice, DevicePlan, HotConnectGroup, Plan};
+use linesman_config::plan::{AddressingChoice, DevicePlan, HotConnectGroup, Plan, TimeSource};
 use linesman_proto::address::{DeviceId, Network, WorkingCounter};
 use linesman_proto::register;
-use linesman_proto::time::{Instant, Span};
+use linesman_proto::time::{DcTime, Instant, Span};
 
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Wire, lock};
+use crate::network_group::NetworkGroup;
 use crate::options::{Options, Polling};
 use crate::procedure::read_only_scan::AL_LEN;
 use crate::procedure::scan::ScanCache;
@@ -58,9 +59,24 @@ pub(crate) struct Context {
     pub(crate) mailboxes: crate::mailbox::MailboxQueues,
     /// Rounds in which not all was as wanted: after each all supervisors look.
     pub(crate) bad_rounds: Arc<AtomicU64>,
+    /// The networks of the process that this one follows.
+    pub(crate) follows: Option<NetworkGroup>,
 }
 
 impl Context {
+    /// The system time when the run began, so that clocks that are set show that of the network that leads, if one does.
+    pub(crate) fn epoch(&self) -> DcTime {
+        let told = self.follows.as_ref().and_then(NetworkGroup::told);
+        let at = self.wire.now();
+        let of_lead = told.map(|told| DcTime(told.time_at(at).0.wrapping_sub(at.as_nanos())));
+        of_lead.unwrap_or(self.options.clock_epoch)
+    }
+
+    /// True if the reference clock is led to this computer's time, or to that of another network, from the start.
+    pub(crate) fn is_led_at_once(&self) -> bool {
+        self.follows.is_some() || self.plan.time_source == Some(TimeSource::Host)
+    }
+
     /// Sleeps until the next alert after `seen`, at most `span`.
     pub(crate) fn sleep_until_alert(&self, seen: u64, span: Span) -> AlertSleep {
         AlertSleep {

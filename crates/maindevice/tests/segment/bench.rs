@@ -9,6 +9,9 @@ use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Segment;
 use linesman_sim::segment_file::SegmentFile;
 
+/// How long a frame waits before it leaves.
+pub(crate) type LeavesAfter = Box<dyn Fn(&[u8]) -> Span>;
+
 /// Frames that the bench itself drops or doubles on their way back, by their number.
 pub(crate) type Tamper = Box<dyn FnMut(u64) -> Fate>;
 
@@ -43,8 +46,11 @@ pub(crate) struct Bench {
     pub(crate) bad_cycles: u64,
     /// What crosses the cards, if anybody wants to know: by which card, whether it comes back, and the frame.
     pub(crate) crossed: Option<Vec<(Path, bool, Vec<u8>)>>,
+    /// How long after it was given away a frame leaves the card: programs that run before it.
+    pub(crate) leaves_after: Option<LeavesAfter>,
     arrivals: u64,
     delayed: Vec<(Instant, Path, Vec<u8>)>,
+    leaving: Vec<(Instant, Path, Vec<u8>)>,
 }
 
 impl Bench {
@@ -68,8 +74,10 @@ impl Bench {
             cycles: 0,
             bad_cycles: 0,
             crossed: None,
+            leaves_after: None,
             arrivals: 0,
             delayed: Vec::new(),
+            leaving: Vec::new(),
         }
     }
 
@@ -81,6 +89,12 @@ impl Bench {
         loop {
             while let Some(transmit) = self.device.poll_transmit(self.now, &mut buffer) {
                 let frame = &buffer[..transmit.len];
+                let waits = self.leaves_after.as_ref().map_or(Span::ZERO, |after| after(frame));
+                if waits > Span::ZERO {
+                    let leaving = (transmit.at + waits, transmit.path, frame.to_vec());
+                    self.leaving.push(leaving);
+                    continue;
+                }
                 self.segment.handle_frame(transmit.at, transmit.path, frame);
                 self.note(transmit.path, false, frame);
             }
@@ -93,7 +107,8 @@ impl Bench {
                 return true;
             }
             let delayed = self.delayed.iter().map(|(at, ..)| *at).min();
-            let next = [self.device.poll_timeout(), self.segment.poll_timeout(), delayed];
+            let leaving = self.leaving.iter().map(|(at, ..)| *at).min();
+            let next = [self.device.poll_timeout(), self.segment.poll_timeout(), delayed, leaving];
             let next = next.into_iter().flatten().min().unwrap_or(Instant::MAX);
             if next > end {
                 self.now = end;
@@ -111,6 +126,11 @@ impl Bench {
             while let Some(due) = self.delayed.iter().position(|(at, ..)| *at <= self.now) {
                 let (_, path, frame) = self.delayed.remove(due);
                 self.device.handle_frame(self.now, path, &frame);
+            }
+            while let Some(due) = self.leaving.iter().position(|(at, ..)| *at <= self.now) {
+                let (at, path, frame) = self.leaving.remove(due);
+                self.segment.handle_frame(at, path, &frame);
+                self.note(path, false, &frame);
             }
             self.judge();
             if self.device.poll_timeout().is_some_and(|at| at <= self.now) {

@@ -14,6 +14,7 @@ mod loop_control;
 mod mailbox;
 #[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod many;
+mod network_time;
 mod reference_clock;
 mod ring;
 mod robust;

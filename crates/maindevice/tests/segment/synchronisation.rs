@@ -185,7 +185,7 @@ fn latch_time(bench: &mut Bench, plan: &Plan) -> u64 {
     turn.unwrap_or_else(|| panic!("no latch within a cycle: {arrivals:?}"))[1].0
 }
 
-// proves: SYN-21 (S), SYN-01 (S) partial: without SYNC1
+// proves: SYN-21 (S)
 #[test]
 fn objects_show_mode_cycle_and_what_is_supported_of_each_subdevice() {
     let (mut bench, _) = in_op(|kind| kind == "EL4102");
@@ -256,4 +256,86 @@ fn subdevice_measures_its_own_times_when_told_to() {
     assert_eq!(number(&mut bench, "V", OUTPUTS, 8), 0, "done");
     let (cycle, copy) = (number(&mut bench, "V", OUTPUTS, 5), number(&mut bench, "V", OUTPUTS, 6));
     assert_eq!((cycle, copy), (155_600, 35_600));
+}
+
+/// Four alike behind a coupler.
+const FOUR: &str = r#"
+name = "four"
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "O1"
+type = "EL4102"
+on = "K1.B"
+[[device]]
+name = "O2"
+type = "EL4102"
+on = "O1.B"
+[[device]]
+name = "O3"
+type = "EL4102"
+on = "O2.B"
+[[device]]
+name = "O4"
+type = "EL4102"
+on = "O3.B"
+"#;
+
+// proves: SYN-01 (S)
+#[test]
+fn each_of_four_alike_keeps_step_as_was_chosen_for_it() {
+    let mut bench = Bench::new(FOUR);
+    let mut plan = plan(&mut bench, |kind| kind == "EL4102");
+    let mode = |mode: u8| StartUpCommand {
+        transition: Transition::PRE_OP_TO_SAFE_OP,
+        action: StartUpAction::CoeDownload {
+            object: ObjectAddress::new(OUTPUTS, 1),
+            complete_access: false,
+            data: vec![mode, 0],
+        },
+        comment: "how it keeps step".to_owned(),
+    };
+    // With SYNC1, 50 µs behind SYNC0, with SYNC0, with the frames, in free run.
+    for (no, chosen) in [(1_usize, 3), (2, 2), (3, 1), (4, 0)] {
+        let device = &mut plan.devices[no];
+        device.start_up = vec![mode(chosen)];
+        match (chosen, &mut device.settings.clock) {
+            (3, Some(clock)) => {
+                clock.assign_activate = 0x0700;
+                clock.sync1_cycle = Span::us(50);
+            }
+            (2, _) => {}
+            (_, clock) => *clock = None,
+        }
+    }
+    start(&mut bench, plan.clone());
+    bench.run_for(Span::s(3));
+    for (name, expected) in [("O1", 3), ("O2", 2), ("O3", 1), ("O4", 0)] {
+        assert_eq!(number(&mut bench, name, OUTPUTS, 1), expected, "{name}");
+        assert_eq!(bench.state(name), "OP", "{name}");
+    }
+    let mut times = |name: &str| -> Vec<u64> {
+        let id = bench.id(name);
+        let range = plan.devices[id.index()].outputs.clone();
+        let signal = bench.segment.outputs(id)[0];
+        let mut when = |value: u8| {
+            bench.device.outputs_mut()[range.clone()][0] = value;
+            for _ in 0..20_000 {
+                bench.run_for(STEP);
+                if bench.segment.signals().value(signal) == i32::from(value) {
+                    return bench.now.as_nanos() % CYCLE;
+                }
+            }
+            panic!("the output of {name} does not take the value {value}");
+        };
+        (1..=10).map(&mut when).collect()
+    };
+    let (by_sync1, by_sync0, by_frames) = (times("O1"), times("O2"), times("O3"));
+    let apart = |later: u64, earlier: u64| (later + CYCLE - earlier) % CYCLE;
+    assert!(apart(by_sync1[9], by_sync0[9]).abs_diff(50_000) <= 3_000, "{by_sync1:?} {by_sync0:?}");
+    // The shift of the network and its own, 300 µs each, behind the frame.
+    let behind = apart(by_sync0[9], by_frames[9]);
+    assert!(behind.abs_diff(600_000) <= 20_000, "{by_sync0:?} {by_frames:?}");
 }

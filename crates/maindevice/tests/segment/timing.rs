@@ -1,13 +1,20 @@
 //! What the timing of a plan says beforehand, against a line that runs: SubDevices in step with SYNC0, and a computer
 //! that sends late.
 
+use std::cell::Cell;
+
 use linesman_config::fault::FaultName;
 use linesman_config::plan::layout::TaskOptions;
 use linesman_config::plan::timing::{TimingOptions, TimingVerdict};
-use linesman_config::plan::{ClockSettings, Plan, PlanOptions, ProcessAccess, ShiftReference};
+use linesman_config::plan::{
+    ClockSettings, IoAt, Plan, PlanOptions, ProcessAccess, ShiftReference,
+};
 use linesman_config::profile::{DirectionTimes, SyncTimes};
-use linesman_maindevice::Event;
-use linesman_proto::address::DeviceId;
+use linesman_maindevice::{Event, ProbeRequest, Target};
+use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_proto::command::Addressing;
+use linesman_proto::frame::FrameView;
+use linesman_proto::register;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_sim::segment_file::FaultEntry;
@@ -218,5 +225,230 @@ fn outputs_come_their_shift_after_their_frame_where_inputs_are_fetched_earlier()
     let clock = planned.reference_clock().expect("a reference clock");
     for at in output_times(&mut bench, &planned, clock, cycle) {
         assert!((1_300_000..1_304_000).contains(&at), "{at} ns after the frame with inputs");
+    }
+}
+
+/// The third of these has outputs and inputs.
+const THREE_TASKS: &str = r#"
+name = "three tasks"
+seed = 11
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "O1"
+type = "EL4102"
+on = "K1.B"
+[[device]]
+name = "I1"
+type = "EL3102"
+on = "O1.B"
+[[device]]
+name = "B1"
+type = "EL7041"
+on = "I1.B"
+"#;
+const TASKS: [(&str, u64); 3] = [("IoTask", 16), ("PlcTask", 120), ("PlcTask3", 184)];
+const SLOW: Span = Span::ms(2);
+
+/// Three tasks of 2 ms that exchange at their end, with one SubDevice in step with SYNC0 each.
+fn three_tasks(bench: &mut Bench, times: &[SyncTimes]) -> Plan {
+    let inventory = bench.scan();
+    let mut planned = inventory.planned(AlState::Op);
+    for (device, (task, _)) in planned.iter_mut().skip(1).zip(TASKS) {
+        device.settings.task = Some(task.to_owned());
+        device.settings.clock = Some(ClockSettings {
+            assign_activate: 0x0300,
+            sync0_cycle: SLOW,
+            ..ClockSettings::default()
+        });
+    }
+    let task = |(name, _)| TaskOptions { io_at: IoAt::TaskEnd, ..TaskOptions::new(name, SLOW) };
+    let tasks = TASKS.map(task).to_vec();
+    let options = PlanOptions { tasks, clock_datagrams: true, ..PlanOptions::default() };
+    let plan = Plan::build(&planned, inventory.tree().clone(), &options);
+    let mut plan = plan.expect("a plan");
+    for (device, times) in plan.devices.iter_mut().zip(times) {
+        device.sync_times = *times;
+    }
+    plan
+}
+
+/// The task of a cyclic frame, from 1, by its logical addresses.
+fn task_of(frame: &[u8]) -> Option<usize> {
+    let view = FrameView::parse(frame).ok()?;
+    let logical = view.datagrams().map_while(Result::ok).find_map(|datagram| {
+        let is_logical = datagram.command()?.addressing() == Addressing::Logical;
+        is_logical.then(|| datagram.logical().0)
+    });
+    Some((logical? >> 24) as usize).filter(|task| (1..=TASKS.len()).contains(task))
+}
+
+/// How long the frame of a task waits until the programs before it, and its own, are done: the first one's end is where
+/// the cycle begins. In every third cycle they take their longest, else nothing.
+fn waits_for_programs() -> impl Fn(&[u8]) -> Span {
+    let cycle = Cell::new(0_u64);
+    move |frame| {
+        let Some(task) = task_of(frame) else { return Span::ZERO };
+        if task == 1 {
+            cycle.set(cycle.get() + 1);
+        }
+        match cycle.get().is_multiple_of(3) {
+            true => Span::us(TASKS[1..task].iter().map(|(_, takes)| takes).sum()),
+            false => Span::ZERO,
+        }
+    }
+}
+
+// S0 L656-688.
+// proves: SYN-28 (S) partial: the first rule; the second is proven by the calculation
+#[test]
+fn of_three_tasks_the_verdict_by_the_last_frame_agrees_with_what_the_subdevices_count() {
+    let mut times = measured();
+    let both = times[1].outputs;
+    times.push(SyncTimes { outputs: both, inputs: both });
+    for (shift_us, expected) in [
+        (None, TimingVerdict::Pass),
+        (Some(400), TimingVerdict::Pass),
+        (Some(250), TimingVerdict::Fail),
+    ] {
+        let mut bench = Bench::new(THREE_TASKS);
+        let mut plan = three_tasks(&mut bench, &times);
+        plan.outputs_shift = shift_us.map(Span::us);
+        let execution = TASKS.map(|(name, us)| (name.to_owned(), Span::us(us))).to_vec();
+        let options = TimingOptions {
+            execution,
+            jitter: Some(Span::ZERO),
+            task_jitter: Some(Span::ZERO),
+            cable_m: Some(0),
+            ..TimingOptions::default()
+        };
+        let timing = plan.timing(&options);
+        let case = format!("shift {shift_us:?}: {timing:#?}");
+        assert_eq!(timing.verdict(), expected, "{case}");
+        for device in &timing.devices {
+            assert_eq!(device.after_frames.frame, Some(2), "the last frame decides: {case}");
+            assert_eq!(device.before_next.frame, Some(0), "the first frame decides: {case}");
+        }
+        bench.leaves_after = Some(Box::new(waits_for_programs()));
+        bench.device.start(bench.now, plan);
+        bench.run_for(Span::s(8));
+        let count = |bench: &mut Bench, name: &str| -> u64 {
+            [0x0B, 0x0C, 0x0D].map(|at| number(bench, name, OUTPUTS, at)).iter().sum()
+        };
+        let before = ["O1", "B1"].map(|name| count(&mut bench, name));
+        let all_up = ["O1", "I1", "B1"].map(|name| bench.state(name) == "OP");
+        bench.run_for(Span::s(4));
+        let after = ["O1", "B1"].map(|name| count(&mut bench, name));
+        match expected {
+            TimingVerdict::Pass => {
+                assert_eq!(all_up, [true; 3], "{case}");
+                assert_eq!(after, before, "nobody missed an event: {case}");
+            }
+            // Who is served by the last frame gets its outputs behind SYNC0.
+            TimingVerdict::Fail | TimingVerdict::NotJudged => {
+                let suffers = !all_up[2] || after[1] > before[1];
+                assert!(suffers, "{all_up:?} {before:?} {after:?} {case}");
+            }
+        }
+    }
+}
+
+/// Time within the cycle by the reference clock, in ns.
+fn phase(bench: &Bench, plan: &Plan, cycle: Span) -> i64 {
+    let reference = plan.reference_clock().expect("a reference clock");
+    let clock = bench.segment.controller(reference).expect("it is there");
+    (clock.system_time(bench.now) % cycle.as_nanos()) as i64
+}
+
+/// Runs until what `seen` shows changes; when that was within the cycle.
+fn when_changed<T: PartialEq>(bench: &mut Bench, plan: &Plan, seen: impl Fn(&Bench) -> T) -> i64 {
+    let before = seen(bench);
+    for _ in 0..20_000 {
+        bench.run_for(Span::us(1));
+        if seen(bench) != before {
+            return phase(bench, plan, CYCLE);
+        }
+    }
+    panic!("nothing changes");
+}
+
+/// The three buffers of a SyncManager, as they lie in the memory of its controller.
+fn buffers(bench: &Bench, plan: &Plan, id: DeviceId, manager: u8) -> Vec<u8> {
+    let planned = &plan.devices[id.index()].sync_managers;
+    let (_, config) = planned.iter().find(|(number, _)| *number == manager).expect("it has one");
+    let (start, len) = (usize::from(config.start.0) - 0x1000, usize::from(config.length));
+    bench.segment.controller(id).expect("a controller").ram()[start..start + 3 * len].to_vec()
+}
+
+/// When SYNC0 of a SubDevice comes next, within the cycle.
+fn next_sync0(bench: &mut Bench, plan: &Plan, station: StationAddress) -> i64 {
+    let (target, register) = (Target::Station(station), register::START_TIME.address);
+    bench.device.probe(bench.now, ProbeRequest { target, register, len: 8, write: None });
+    let mut found = None;
+    bench.run_until(Span::ms(20), |event| match event {
+        Event::Probed { result: Ok(reply), .. } => {
+            found = Some(u64::from_le_bytes(reply.bytes(0)));
+            true
+        }
+        _ => false,
+    });
+    // Some clocks have the low half only.
+    let reference = plan.reference_clock().expect("a reference clock");
+    let now = bench.segment.controller(reference).expect("it is there").system_time(bench.now);
+    let ahead = (found.expect("an answer") as u32).wrapping_sub(now as u32) as i32;
+    (now.wrapping_add_signed(ahead.into()) % CYCLE.as_nanos()) as i64
+}
+
+// The plot is drawn from these numbers (`plan --timing --svg`).
+// proves: SYN-26
+#[test]
+fn frames_sync_reading_and_writing_of_each_clocked_subdevice_are_where_the_plot_has_them() {
+    let times = measured();
+    let mut bench = Bench::new(PLANT);
+    let mut plan = plan(&mut bench, TaskOptions::new("cyclic", CYCLE), terminals);
+    for (device, times) in plan.devices.iter_mut().zip(&times) {
+        device.sync_times = *times;
+    }
+    let timing = plan.timing(&options(1));
+    start(&mut bench, plan.clone());
+    bench.run_for(Span::s(4));
+    let [outputs, inputs] = timing.devices.as_slice() else { panic!("{timing:#?}") };
+    // What is looked at once a µs is seen up to 1 µs late; clocks and cycle are in step within some 100 ns.
+    let is_within = |what: &str, at: i64, from: i64, to: i64| {
+        let cycle = CYCLE.as_nanos() as i64;
+        let at = if at > to + cycle / 2 { at - cycle } else { at };
+        assert!((from - 500..=to + 1_500).contains(&at), "{what}: {at} ns, {from} to {to} ns");
+    };
+    for round in 1..=5_u8 {
+        let (id, planned) = (DeviceId(1), outputs.times.as_ref().expect("times"));
+        let signal = bench.segment.outputs(id)[0];
+        let range = plan.devices[1].outputs.clone();
+        bench.device.outputs_mut()[range][0] = round;
+        let frame = when_changed(&mut bench, &plan, |bench| buffers(bench, &plan, id, 2));
+        let arrival = planned.frames.iter().find(|frame| frame.own).expect("its frame");
+        is_within("frame with outputs", frame, arrival.earliest_ns, arrival.latest_ns);
+        let read = when_changed(&mut bench, &plan, |bench| bench.segment.signals().value(signal));
+        let latest = planned.sync0_ns + planned.outputs_read.expect("known").as_nanos() as i64;
+        is_within("outputs", read, planned.sync0_ns, latest);
+        let sync0 = next_sync0(&mut bench, &plan, plan.devices[1].station);
+        is_within("SYNC0", sync0, planned.sync0_ns, planned.sync0_ns);
+
+        let (id, planned) = (DeviceId(2), inputs.times.as_ref().expect("times"));
+        let signal = bench.segment.inputs(id)[0];
+        bench.segment.signals_mut().set(signal, i32::from(round) * 1_000);
+        let written = when_changed(&mut bench, &plan, |bench| buffers(bench, &plan, id, 3));
+        let latest = planned.sync0_ns + planned.inputs_written.expect("known").as_nanos() as i64;
+        is_within("inputs", written, planned.sync0_ns, latest);
+        let sync0 = next_sync0(&mut bench, &plan, plan.devices[2].station);
+        is_within("SYNC0", sync0, planned.sync0_ns, planned.sync0_ns);
+        // The frame that fetches them is that of the next cycle.
+        let range = plan.devices[2].inputs.clone();
+        let fetched =
+            when_changed(&mut bench, &plan, |bench| bench.device.inputs()[range.clone()].to_vec());
+        let arrival = planned.frames.iter().find(|frame| frame.fetches).expect("its frame");
+        // It is seen when it is back.
+        is_within("frame with inputs", fetched, arrival.earliest_ns, arrival.latest_ns + 5_000);
     }
 }
