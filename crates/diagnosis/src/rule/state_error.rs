@@ -26,8 +26,12 @@
 //! takes longer than the cycle, or its outputs come late. It counts both, in 0x1C32 and 0x1C33 (subindex 12
 //! and 11); live, the diagnosis reads them. With 0x002C, 0x002D and 0x0033 its signals themselves do not come.
 //!
+//! Where several SubDevices lose synchronisation, a reference clock nearer to the MainDevice is proposed, if there is
+//! one.
+//!
 //! **What to do.** The code says more than the state: its own page has the checks, most promising first.
 
+mod nearer_reference;
 mod unseen;
 
 use linesman_config::fault::{Class, FaultName};
@@ -249,6 +253,9 @@ fn condition(
         // What it refuses on its way back is more of the same.
         condition = condition.explaining([Symptom::StateLost(device.id)]);
         condition.evidence.extend(counted(device));
+        if let Some(proposal) = nearer_reference::advice(model) {
+            condition = condition.advise(proposal);
+        }
     }
     if let Some(ended) = over(view, device, error) {
         condition = condition.ended(ended);

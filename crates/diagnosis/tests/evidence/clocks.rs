@@ -294,6 +294,33 @@ fn live_a_reference_that_runs_wrong_is_told_as_soon_as_its_speed_is_known() {
     assert!(told.is_some_and(|cycle| cycle < 1_000), "{told:?}");
 }
 
+// proves: DC-06
+#[test]
+fn several_that_lose_synchronisation_far_from_the_reference_have_a_nearer_one_proposed() {
+    let proposals = |reference: u16, lost: &[u16]| {
+        let mut plant = Plant::led_by(reference, Setup::default());
+        for station in lost {
+            plant.left_op(*station, 0x1A);
+        }
+        let report = plant.report();
+        let advice = report.findings.iter().flat_map(|finding| finding.actions.clone());
+        let all: Vec<String> = advice.filter(|one| one.contains("reference = true")).collect();
+        (all, text(&report))
+    };
+    let (proposed, told) = proposals(0x1003, &[0x1001, 0x1002]);
+    assert_eq!(proposed.len(), 2, "at each that lost it: {told}");
+    for one in &proposed {
+        assert!(one.contains("2 SubDevices lost"), "{one}");
+        assert!(one.contains("the reference clock, SubDevice 3"), "where it is now: {one}");
+        assert!(one.contains("let SubDevice 1 be it"), "where it would be: {one}");
+    }
+    // One alone is its own trouble; and nearer than the first nobody is.
+    for (reference, lost) in [(0x1003, &[0x1002][..]), (0x1001, &[0x1002, 0x1003])] {
+        let (proposed, told) = proposals(reference, lost);
+        assert_eq!(proposed, <[String; 0]>::default(), "{told}");
+    }
+}
+
 #[test]
 fn work_that_takes_too_long_is_told_from_signals_that_do_not_come_by_code() {
     for (code, cause) in [(0x1A, FaultName::CycleTooFast), (0x2C, FaultName::SyncLost)] {

@@ -11,9 +11,14 @@ pub const PROCESS: u32 = 0x0100_0000;
 
 /// The time of the reference clock 0x1001, handed round to two more.
 pub fn frmw(time: u64) -> Datagram {
+    frmw_of(0x1001, time)
+}
+
+/// The same of another reference clock.
+fn frmw_of(station: u16, time: u64) -> Datagram {
     Datagram {
         command: Command::Frmw,
-        address: DatagramAddress::Physical(0x1001, RegisterAddress(0x0910)),
+        address: DatagramAddress::Physical(station, RegisterAddress(0x0910)),
         sent: vec![0; 8],
         back: time.to_le_bytes().to_vec(),
         wkc: 3,
@@ -29,10 +34,17 @@ pub struct Plant {
     pub pace: u64,
     pub time: u64,
     pub next: u64,
+    /// The reference clock.
+    reference: u16,
 }
 
 impl Plant {
     pub fn new(setup: Setup) -> Self {
+        Self::led_by(0x1001, setup)
+    }
+
+    /// With another reference clock.
+    pub fn led_by(reference: u16, setup: Setup) -> Self {
         let mut script = Script::with(setup);
         script.is_live = true;
         script.scan(3);
@@ -46,7 +58,7 @@ impl Plant {
             }
         }
         let next = script.now;
-        let mut plant = Self { script, pace: 1_000_000, time: 7_000_000_000, next };
+        let mut plant = Self { script, pace: 1_000_000, time: 7_000_000_000, next, reference };
         plant.cycles(600);
         plant
     }
@@ -64,7 +76,7 @@ impl Plant {
         self.next += 1_000_000;
         assert!(self.script.now <= self.next);
         self.script.now = self.next;
-        [lrw(PROCESS, 2, 2), frmw(self.time)]
+        [lrw(PROCESS, 2, 2), frmw_of(self.reference, self.time)]
     }
 
     /// So many cycles whose frames come back later than usual by so many µs.
