@@ -387,12 +387,10 @@ fn next_sync0(bench: &mut Bench, plan: &Plan, station: StationAddress) -> i64 {
     let (target, register) = (Target::Station(station), register::START_TIME.address);
     bench.device.probe(bench.now, ProbeRequest { target, register, len: 8, write: None });
     let mut found = None;
-    bench.run_until(Span::ms(20), |event| match event {
-        Event::Probed { result: Ok(reply), .. } => {
-            found = Some(u64::from_le_bytes(reply.bytes(0)));
-            true
-        }
-        _ => false,
+    bench.run_until(Span::ms(20), |event| {
+        let Event::Probed { result: Ok(reply), .. } = event else { return false };
+        found = Some(u64::from_le_bytes(reply.bytes(0)));
+        true
     });
     // Some clocks have the low half only.
     let reference = plan.reference_clock().expect("a reference clock");
