@@ -3,10 +3,10 @@
 use linesman_config::plan::Plan;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::watch::NetworkStatus;
-use linesman_maindevice::{FrameStatus, MainDevice, Quality, Statistics};
+use linesman_maindevice::{FrameStatus, MainDevice, OutsideTime, Quality, Statistics, TaskTimes};
 use linesman_proto::address::DeviceId;
 use linesman_proto::state::{DeviceState, NetworkState};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{DcTime, Instant};
 
 use crate::image::{Input, Output, Value};
 
@@ -178,6 +178,25 @@ impl Io<'_> {
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.now
+    }
+
+    /// Task start, last base tick and now, by the time of the network (DC-08). The task is that of the application,
+    /// the first of the plan.
+    #[must_use]
+    pub fn times(&self) -> TaskTimes {
+        self.main.task_times(0, self.now)
+    }
+
+    /// How far a clock outside is ahead that the network follows (DC-11); `None` where it follows none, or nothing is
+    /// known of it yet.
+    #[must_use]
+    pub fn outside_time(&self) -> Option<OutsideTime> {
+        self.main.outside_time()
+    }
+
+    /// Tells a time outside that is `time` now, where the plan has the network follow one that a program tells.
+    pub fn tell_outside_time(&mut self, time: DcTime) {
+        self.main.tell_outside_time(self.now, time);
     }
 
     /// Cycles that were left out so far because the host was late.
