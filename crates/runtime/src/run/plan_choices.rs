@@ -2,9 +2,11 @@
 
 use linesman_config::identity::{mismatch, text};
 use linesman_config::inventory::Inventory;
-use linesman_config::plan::{Plan, PlanOptions, PlannedDevice};
+use linesman_config::plan::time_source::{PTP_TERMINAL, is_type};
+use linesman_config::plan::{Plan, PlanOptions, PlannedDevice, TimeSource};
 use linesman_config::profile::ClockMode;
 use linesman_config::project::{ClockChoice, Project};
+use linesman_proto::address::DeviceId;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
@@ -72,6 +74,10 @@ impl PlanChoices {
         if self.clocks {
             clock(&mut planned, options.cycle)?;
             options.clock_datagrams = true;
+            // It is there for its time (DC-19).
+            let tells = |one: &PlannedDevice| is_type(&one.profile.type_name, PTP_TERMINAL);
+            let found = planned.iter().position(tells);
+            options.time_source = found.map(|at| TimeSource::Device(DeviceId(at as u32)));
         }
         Plan::build(&planned, inventory.tree().clone(), &options)
             .map_err(|error| format!("{error}. Do: see `linesman plan FILE`"))
