@@ -1,8 +1,8 @@
 //! Interface of an application to the cycle.
 
-use linesman_maindevice::{FrameStatus, Quality, Statistics};
+use linesman_maindevice::{FrameStatus, OutsideTime, Quality, Statistics, TaskTimes};
 use linesman_proto::state::{DeviceState, NetworkState};
-use linesman_proto::time::Instant;
+use linesman_proto::time::{DcTime, Instant};
 use linesman_runtime::run as running;
 pub use linesman_runtime::run::Next;
 use linesman_session::image::Value;
@@ -166,6 +166,28 @@ impl<'a> Io<'a> {
     #[must_use]
     pub const fn now(&self) -> Instant {
         self.inner.now()
+    }
+
+    /// Task start, last base tick and now, by the time of the network: ns since 2000, as the reference clock counts
+    /// them (DC-08). A frame that leaves at one of these times is at the reference clock when that shows it. Before the
+    /// clocks are set, and on a line without clocks, it is this computer's time.
+    #[must_use]
+    pub fn times(&self) -> TaskTimes {
+        self.inner.times()
+    }
+
+    /// How far the clock outside is ahead that the network follows, in ns: another network behind a bridge, IEEE 1588, or
+    /// one that a program tells (DC-11). Only its speed is taken over; to have the time outside, add
+    /// [`OutsideTime::ahead_ns`] to one of [`Io::times`]. `None` where the network follows none, or nothing is known yet.
+    #[must_use]
+    pub fn outside_time(&self) -> Option<OutsideTime> {
+        self.inner.outside_time()
+    }
+
+    /// Tells a time outside that is `time` when the application is called, in ns since 2000, where the project says
+    /// `time_source = "program"`. To be told about once a cycle; jitter is averaged.
+    pub fn tell_outside_time(&mut self, time: DcTime) {
+        self.inner.tell_outside_time(time);
     }
 
     /// Cycles that were left out so far because the host was late.

@@ -106,11 +106,11 @@ pub use linesman_diagnosis::report::{
 pub use linesman_diagnosis::{Diagnosis, Event as FindingEvent, EventKind as FindingChange};
 pub use linesman_link::error::LinkError;
 pub use linesman_maindevice::service::{RefusalKind, ServiceAnswer, ServiceFailure};
-pub use linesman_maindevice::{FrameStatus, Quality, Statistics};
+pub use linesman_maindevice::{FrameStatus, OutsideTime, Quality, Statistics, TaskTimes};
 pub use linesman_proto::address::{DeviceId, RegisterAddress};
 pub use linesman_proto::register::{self, AlStatus};
 pub use linesman_proto::state::{AlState, AlStatusCode, DeviceState, NetworkState, StateValue};
-pub use linesman_proto::time::{Instant, Span};
+pub use linesman_proto::time::{DcTime, Instant, Span};
 pub use linesman_runtime::part::PartFailure;
 pub use linesman_runtime::run::RunError;
 pub use linesman_runtime::run::report::{self as run_report, RunReport};

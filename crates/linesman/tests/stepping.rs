@@ -53,6 +53,30 @@ fn stepped_run_sees_the_same_bytes_at_the_same_times_as_one_that_is_called() {
 }
 
 #[test]
+fn times_of_each_cycle_rise_and_follow_those_of_the_cycle_before() {
+    for options in [RunOptions::us(1_000), RunOptions::us(1_000).exchange_at_end()] {
+        let (mut segment, plan) = machine();
+        let mut run = segment.start(plan, options).unwrap();
+        let mut before = None;
+        for _ in 0..500 {
+            let times = run.cycle().unwrap().times();
+            assert!(
+                times.task_start <= times.base_tick && times.base_tick <= times.now,
+                "{times:?}"
+            );
+            assert!(times.now.0 - times.task_start.0 < 1_000_000, "{times:?}");
+            if let Some(before) = before.replace(times) {
+                assert!(
+                    before.now < times.now && before.task_start < times.task_start,
+                    "{times:?}"
+                );
+            }
+        }
+        run.stop().unwrap();
+    }
+}
+
+#[test]
 fn fault_that_is_injected_between_two_cycles_opens_and_closes_a_finding() {
     let (mut segment, plan) = machine();
     let simulation = segment.simulation().unwrap();
