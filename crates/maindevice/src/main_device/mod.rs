@@ -2,6 +2,7 @@
 
 mod acyclic_rx;
 mod command;
+mod time;
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
@@ -11,9 +12,9 @@ use linesman_proto::address::{DeviceId, Network, Path, WorkingCounter};
 use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
 use linesman_proto::frame::FrameView;
 use linesman_proto::frame::size::{BYTE_NS, WIRE_OVERHEAD};
-use linesman_proto::time::{DcTime, Instant};
+use linesman_proto::time::Instant;
 
-use crate::cyclic::{Cyclic, FrameStatus, OutsideTime, Quality, TaskTimes};
+use crate::cyclic::{Cyclic, FrameStatus, Quality};
 use crate::event::Event;
 use crate::exchange::{
     DatagramData, Exchange, ExchangeError, Purpose, Queued, Reply, Request, SlotState, Ticket,
@@ -417,48 +418,6 @@ impl MainDevice {
     #[must_use]
     pub fn next_cycle(&self, task: usize) -> Option<Instant> {
         self.running.as_ref()?.cyclic.next_cycle(task)
-    }
-
-    /// The time of the network at a time of the run (ns since 2000): that which the reference clock has when a frame
-    /// is there that leaves at `at`. Before it has told its time, the host's: [`Options::clock_epoch`] and what has
-    /// passed since.
-    #[must_use]
-    pub fn network_time(&self, at: Instant) -> DcTime {
-        let by_host = || DcTime(self.options.clock_epoch.0.wrapping_add(at.as_nanos()));
-        let known = self.running.as_ref().and_then(|running| running.cyclic.network_time(at));
-        known.unwrap_or_else(by_host)
-    }
-
-    /// The three times of a task at `now`, by [`MainDevice::network_time`]: when its cycle began, the last base tick,
-    /// now (DC-08). Without that task all are now.
-    #[must_use]
-    pub fn task_times(&self, task: usize, now: Instant) -> TaskTimes {
-        let begun = self.running.as_ref().and_then(|running| running.cyclic.begun(task, now));
-        let (start, tick) = begun.unwrap_or((now, now));
-        let [task_start, base_tick, now] = [start, tick, now].map(|at| self.network_time(at));
-        TaskTimes { task_start, base_tick, now }
-    }
-
-    /// True if this network leads the others of its [`Options::group`].
-    #[must_use]
-    pub const fn leads_group(&self) -> bool {
-        self.lead.is_some()
-    }
-
-    /// Tells a time outside of the network, as it was at `at`, where the plan has the network follow a time that a program
-    /// tells ([`TimeSource::Program`](linesman_config::plan::TimeSource)). To be told about once a cycle; times that are
-    /// off by their jitter are averaged.
-    pub fn tell_outside_time(&mut self, at: Instant, time: DcTime) {
-        if let Some(running) = &mut self.running {
-            running.cyclic.take_outside_time(at, time);
-        }
-    }
-
-    /// How far the clock outside is ahead that the network follows, as it was last read or told (DC-11); `None` where it
-    /// follows none, or nothing is known of it yet.
-    #[must_use]
-    pub fn outside_time(&self) -> Option<OutsideTime> {
-        self.running.as_ref()?.cyclic.outside_time()
     }
 
     /// How good the process data of a SubDevice are, and how old.
