@@ -40,7 +40,7 @@ pub struct OutsideTime {
     /// How far the time outside is ahead of that of the network, in ns, as it was last read. To have the time
     /// outside, add it to a time of the network: nothing else does.
     pub ahead_ns: i64,
-    /// What that is more than when it was first known, in ns: 0 where the speeds agree.
+    /// What that is more than when the speed outside became known, in ns: 0 where the speeds agree.
     pub deviation_ns: i64,
     /// The deviation was within 1 µs ten times in a row.
     pub in_step: bool,
