@@ -18,7 +18,7 @@ mod slot;
 use std::collections::VecDeque;
 
 use linesman_config::plan::FramePlan;
-use linesman_proto::address::Path;
+use linesman_proto::address::{Path, WorkingCounter};
 use linesman_proto::ethernet::{MAX_LEN, MIN_LEN, MacAddress};
 use linesman_proto::frame::{FrameBuilder, MAX_DATAGRAM_DATA};
 use linesman_proto::time::{Instant, Span};
@@ -88,6 +88,8 @@ pub(crate) struct Exchange {
     patience: Span,
     /// Whether what one card sends arrives at the other: `None` before the first frame, or with one card.
     ring_intact: Option<bool>,
+    /// How many counted in what each card received of the last broadcast read of a ring's cycle.
+    responding_by_card: Option<[WorkingCounter; 2]>,
 }
 
 impl Exchange {
@@ -107,6 +109,7 @@ impl Exchange {
             number: 0,
             patience,
             ring_intact: None,
+            responding_by_card: None,
         }
     }
 
@@ -173,6 +176,7 @@ impl Exchange {
     /// have been abandoned.
     pub(crate) fn prebuild(&mut self, frames: impl Iterator<Item = FramePlan>) -> Vec<Prebuilt> {
         let (source, ring) = (self.sources[0], self.ring);
+        self.responding_by_card = None;
         self.cyclic =
             (0..).zip(frames).map(|(at, one)| Prebuilt::new(at, &one, source, ring)).collect();
         self.cyclic.clone()
@@ -341,7 +345,19 @@ impl Exchange {
         let answered = self.slot(at).copies.arrived.contains(&true);
         self.outgoing.remove(at);
         self.retire(at, if answered { SlotState::Answered } else { SlotState::GivenUp });
+        self.count_by_card(at);
         Some(at)
+    }
+
+    /// Notes how many counted in what each card has received of a frame of a ring that is out no longer.
+    fn count_by_card(&mut self, at: u8) {
+        let Self { ring: true, slots, cyclic, responding_by_card, .. } = self else { return };
+        let slot = &slots[usize::from(at)];
+        let Purpose::Cyclic { frame } = slot.purpose else { return };
+        if cyclic.get(frame as usize).is_some_and(Prebuilt::has_presence) {
+            let counted = if slot.state == SlotState::Answered { slot.counted } else { [0; 2] };
+            *responding_by_card = Some(counted.map(WorkingCounter));
+        }
     }
 
     /// Gives up all frames of a plan that runs no longer: they must not be taken for those of the next.
@@ -379,6 +395,11 @@ impl Exchange {
     /// Forgets all datagrams of procedures that have not been sent yet.
     pub(crate) fn forget(&mut self, cancelled: impl Fn(Ticket) -> bool) {
         self.queue.retain(|queued| !cancelled(queued.ticket));
+    }
+
+    /// How many counted in what each card received of the last broadcast read of the cycle; `None` without a ring.
+    pub(crate) fn responding_by_card(&self) -> Option<[WorkingCounter; 2]> {
+        self.responding_by_card
     }
 
     pub(crate) fn ring_intact(&self) -> Option<bool> {

@@ -133,6 +133,8 @@ pub(crate) struct Prebuilt {
     shapes: Vec<DatagramShape>,
     /// Bytes that a whole reply has at least.
     len: usize,
+    /// Where the working counter of the broadcast read is that counts who is there.
+    presence_at: Option<usize>,
 }
 
 /// What a datagram becomes when its outputs must not be taken for fresh: what is read goes on.
@@ -233,6 +235,9 @@ impl Prebuilt {
         copies.unsent -= 1;
         let awaited = if ring { Slot::NONE } else { index };
         let first = shapes.first().copied().unwrap_or(DatagramShape::NONE);
+        let counted = plan.datagrams.iter().zip(data_offsets(plan));
+        let mut counted = counted.filter(|(one, _)| one.role == Role::Presence);
+        let presence_at = counted.next().map(|(one, data)| data + one.len);
         Self {
             bytes,
             pieces,
@@ -244,6 +249,7 @@ impl Prebuilt {
             first,
             shapes,
             len: at,
+            presence_at,
         }
     }
 
@@ -356,6 +362,17 @@ impl Prebuilt {
     /// Whether a frame with the datagrams that were sent is as it left the card: nobody had a hand in it.
     pub(super) fn is_echo(&self, frame: &[u8]) -> bool {
         self.fixed.iter().all(|range| frame.get(range.clone()) == self.bytes.get(range.clone()))
+    }
+
+    /// How many counted in the broadcast read of a copy that has the datagrams which were sent; 0 where it has none.
+    pub(super) fn counted(&self, copy: &[u8]) -> u16 {
+        let counter = self.presence_at.and_then(|at| copy.get(at..)?.first_chunk());
+        counter.map_or(0, |bytes| u16::from_le_bytes(*bytes))
+    }
+
+    /// True if it has a broadcast read that counts who is there.
+    pub(super) const fn has_presence(&self) -> bool {
+        self.presence_at.is_some()
     }
 
     #[inline]

@@ -153,14 +153,18 @@ impl Exchange {
         }
         slot.copies.arrived[copy] = true;
         self.ring_intact = Some(path != sender);
-        if slot.reply.is_empty() {
-            slot.reply.extend_from_slice(frame);
+        let Slot { purpose, sent, reply, counted, .. } = slot;
+        let prebuilt = match *purpose {
+            Purpose::Cyclic { frame } => self.cyclic.get(frame as usize),
+            Purpose::Acyclic => None,
+        };
+        if reply.is_empty() {
+            *counted = [0; 2];
+        }
+        counted[path.index()] += prebuilt.map_or(0, |prebuilt| prebuilt.counted(frame));
+        if reply.is_empty() {
+            reply.extend_from_slice(frame);
         } else {
-            let Slot { purpose, sent, reply, .. } = slot;
-            let prebuilt = match *purpose {
-                Purpose::Cyclic { frame } => self.cyclic.get(frame as usize),
-                Purpose::Acyclic => None,
-            };
             merge::merge(reply, sender.other(), frame, |card, data| match prebuilt {
                 Some(prebuilt) => prebuilt.sent_by(card, data),
                 None => sent.get(data),
@@ -168,6 +172,7 @@ impl Exchange {
         }
         if slot.is_complete() {
             self.retire(at, SlotState::Answered);
+            self.count_by_card(at);
             Received::Complete(at)
         } else {
             Received::FirstCopy

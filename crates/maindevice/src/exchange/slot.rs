@@ -85,6 +85,8 @@ pub(crate) struct Slot {
     pub(crate) truncated: bool,
     pub(crate) deadline: Instant,
     pub(crate) copies: Copies,
+    /// How many counted in the broadcast read of what has arrived at each card; of a ring only.
+    pub(crate) counted: [u16; 2],
     /// The datagrams in it, in order; empty for cyclic frames.
     pub(crate) requests: Vec<Queued>,
 }
@@ -107,6 +109,7 @@ impl Slot {
             truncated: false,
             deadline: Instant::MAX,
             copies: Copies::new(0, false),
+            counted: [0; 2],
             requests: Vec::with_capacity(MAX_ACYCLIC_DATAGRAMS),
         }
     }

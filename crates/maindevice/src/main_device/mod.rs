@@ -445,6 +445,15 @@ impl MainDevice {
         self.running.as_ref()?.cyclic.responding()
     }
 
+    /// How many SubDevices had processed what each card received of the last cyclic broadcast read of a ring, card A
+    /// first (RED-15). While the ring is whole, card B receives what card A has sent: `[0, all]`. While it is open,
+    /// each card counts its half. `None` without a ring, and before the first cycle.
+    #[must_use]
+    pub fn responding_by_card(&self) -> Option<[WorkingCounter; 2]> {
+        self.running.as_ref()?;
+        self.exchange.responding_by_card()
+    }
+
     /// The running plan.
     #[must_use]
     pub fn plan(&self) -> Option<&Plan> {

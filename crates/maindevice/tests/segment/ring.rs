@@ -92,6 +92,35 @@ fn each_frame_leaves_by_both_cards_and_only_the_copy_of_card_a_is_counted() {
     }
 }
 
+/// TwinCAT's `SlaveCount` and `SlaveCount2`.
+// proves: RED-15
+#[test]
+fn each_card_counts_those_whom_its_received_frames_have_met() {
+    let mut bench = bench();
+    bench.start(AlState::Op);
+    let counts = |bench: &Bench| bench.device.responding_by_card().map(|both| both.map(|one| one.0));
+    bench.run_for(Span::ms(10));
+    assert_eq!(counts(&bench), Some([0, 4]), "whole: the second card counts every SubDevice");
+    for (cut, halves) in [
+        ("maindevice-B1.A", [0, 4]),
+        ("B1.B-B2.A", [1, 3]),
+        ("B2.B-B3.A", [2, 2]),
+        ("B3.B-B4.A", [3, 1]),
+        ("B4.B-maindevice.B", [4, 0]),
+    ] {
+        let entry = FaultEntry::new("link-open".parse().unwrap()).at(cut);
+        let fault = bench.segment.inject(bench.now, &entry).unwrap();
+        bench.run_for(Span::ms(50));
+        assert_eq!(counts(&bench), Some(halves), "{cut}");
+        bench.segment.heal(bench.now, fault);
+        bench.run_for(Span::s(5));
+        assert_eq!(counts(&bench), Some([0, 4]), "{cut} is mended");
+    }
+    bench.segment.inject(bench.now, &FaultEntry::new("device-off".parse().unwrap()).device("B2")).unwrap();
+    bench.run_for(Span::s(1));
+    assert_eq!(counts(&bench), Some([1, 2]), "B2 has no power");
+}
+
 // proves: RED-04
 #[test]
 fn a_break_costs_at_most_one_frame_and_both_neighbours_close_their_port() {
