@@ -150,6 +150,14 @@ impl<'a> Io<'a> {
         self.inner.present()
     }
 
+    /// Numbers of SubDevices that had processed what each card of a ring received of the last broadcast read, card A
+    /// first (RED-15): `[0, all]` while the ring is whole, each card's half while it is open. `None` without a ring,
+    /// and before the first cycle.
+    #[must_use]
+    pub fn responding_by_card(&self) -> Option<[u16; 2]> {
+        self.inner.responding_by_card()
+    }
+
     /// Result of a frame of a task, the last time.
     #[must_use]
     pub fn frame_status(&self, task: usize, frame: usize) -> Option<FrameStatus> {

@@ -162,6 +162,14 @@ impl Io<'_> {
         self.main.network_status().map_or(0, NetworkStatus::present)
     }
 
+    /// How many SubDevices had processed what each card of a ring received of the last broadcast read, card A first
+    /// (RED-15): `[0, all]` while the ring is whole, each card's half while it is open. `None` without a ring, and
+    /// before the first cycle.
+    #[must_use]
+    pub fn responding_by_card(&self) -> Option<[u16; 2]> {
+        self.main.responding_by_card().map(|both| both.map(|count| count.0))
+    }
+
     /// How a frame of a task went the last time.
     #[must_use]
     pub fn frame_status(&self, task: usize, frame: usize) -> Option<FrameStatus> {

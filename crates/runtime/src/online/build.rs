@@ -28,6 +28,7 @@ pub(super) fn driven(
     let mut report = known(plan, status, snapshot.now);
     report.driven = true;
     report.responding = snapshot.responding.map(|count| count.0);
+    report.responding_by_card = snapshot.responding_by_card.map(|both| both.map(|count| count.0));
     for (device, planned) in report.devices.iter_mut().zip(&plan.devices) {
         add_data(device, planned, snapshot);
     }

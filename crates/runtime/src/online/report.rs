@@ -29,6 +29,10 @@ pub struct OnlineReport {
     pub present: u32,
     /// How many answered the last broadcast read; `null`: there was none.
     pub responding: Option<u16>,
+    /// The same by the card that received it, card A first: while a ring is whole, all are counted by card B. `null`:
+    /// there is no ring.
+    #[serde(default)]
+    pub responding_by_card: Option<[u16; 2]>,
     /// The time of the network; `null`: no clocks are in use.
     #[serde(default)]
     pub clock: Option<OnlineClock>,

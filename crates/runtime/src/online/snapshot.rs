@@ -63,6 +63,8 @@ pub struct Snapshot {
     pub frames: Vec<FrameStatus>,
     /// How many answered the last cyclic broadcast read.
     pub responding: Option<WorkingCounter>,
+    /// The same by the card that received it, card A first; of a ring only.
+    pub responding_by_card: Option<[WorkingCounter; 2]>,
     /// Mailboxes in which something went wrong: whose, how often, and what stands.
     pub mailboxes: Vec<(DeviceId, u64, Vec<ProtocolError>)>,
 }
@@ -79,6 +81,7 @@ impl Snapshot {
             wanted: main.wanted_states(),
             frames: Vec::new(),
             responding: main.responding(),
+            responding_by_card: main.responding_by_card(),
             mailboxes: Vec::new(),
         };
         if let Some(plan) = main.plan() {

@@ -163,6 +163,17 @@ fn mailbox(device: &OnlineDevice) -> String {
     }
 }
 
+/// `Ring: 0 SubDevices counted in what card A receives, 9 in that of card B: it is whole.`
+fn by_card(report: &OnlineReport, [of_a, of_b]: [u16; 2]) -> String {
+    // A frame that meets all of them has gone all round, from one card to the other.
+    let is_whole = of_a == 0 && u32::from(of_b) == report.present;
+    let state = if is_whole { "whole" } else { "open, or not all of it answers" };
+    format!(
+        "Ring: {} counted in what card A receives, {of_b} in that of card B: it is {state}.\n",
+        count(of_a.into(), "SubDevice")
+    )
+}
+
 fn frames(report: &OnlineReport) -> String {
     let sent = |name: &str, counts: &FrameCounts| {
         let rate = counts.per_second.map(|rate| format!(" ({rate:.0} a second)"));
@@ -197,6 +208,9 @@ fn frames(report: &OnlineReport) -> String {
         text.push_str(&format!(
             "The network's time, that of {reference}, is {off} {how} the host's.\n"
         ));
+    }
+    if let Some(counts) = report.responding_by_card {
+        text.push_str(&by_card(report, counts));
     }
     for card in &report.cards {
         let link = match card.carrier {
