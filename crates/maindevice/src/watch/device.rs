@@ -130,7 +130,9 @@ impl WatchedDevice {
         for port in Port::ALL {
             let seen = links.port_state(port);
             let planned = self.planned[port];
-            let bits = match (planned, seen.link, seen.communication) {
+            // A port with a link that waits for its order to open (JCT-12) leads nowhere.
+            let talks = seen.communication && !(planned && seen.closed);
+            let bits = match (planned, seen.link, talks) {
                 (true, false, _) | (false, _, true) if self.changeable[port] => continue,
                 (true, false, _) => DeviceState::MISSING_LINK,
                 (true, true, false) => DeviceState::LINK_ERROR,

@@ -2,9 +2,9 @@ use linesman_config::identity::Mismatch;
 use linesman_config::plan::{DevicePlan, HotConnectGroup};
 use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
 use linesman_proto::port::Port;
-use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters};
+use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters, PortState};
 use linesman_proto::sii::Identity;
-use linesman_proto::state::{AlState, AlStatusCode};
+use linesman_proto::state::{AlState, AlStatusCode, DeviceState};
 use linesman_proto::topology::{End, Tree, Wired};
 
 use super::*;
@@ -43,6 +43,45 @@ fn watch_with_group() -> Watch {
         places: Vec::new(),
     });
     Watch::new(Arc::new(plan))
+}
+
+// proves: RED-16 (U)
+#[test]
+fn the_state_word_names_slave_and_port_where_a_ring_is_open_whatever_port_that_is() {
+    // Two junctions in a ring, wired at this port: it leads from one to the other, and from there to the second card.
+    for (place, port) in [Port::B, Port::C, Port::D].into_iter().enumerate() {
+        let wired = [End::MainDevice(Path::A), End::Controller(0, port)];
+        let wired = wired.map(|on| Wired { on, entry: Port::A });
+        let mut plan = Plan::empty(Tree::from_wiring(&wired, Some((1, port))).unwrap());
+        plan.devices.extend([0, 1].map(|id| DevicePlan::bare(DeviceId(id))));
+        let mut watch = Watch::new(Arc::new(plan));
+        for id in [0, 1] {
+            watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
+        }
+        let words = |watch: &Watch| {
+            let devices = watch.network_status().devices();
+            devices.iter().map(|device| device.state().0).collect::<Vec<_>>()
+        };
+        let (whole, out) = ([Port::A, port], [0x2000, 0x4000, 0x8000][place]);
+        let mut see = |first: &[Port], second: &[Port]| {
+            watch.handle_event(at(1), &links(0, first));
+            watch.handle_event(at(1), &links(1, second));
+            words(&watch)
+        };
+        assert_eq!(see(&whole, &whole), [0x0008, 0x0008], "whole");
+        assert_eq!(see(&[Port::A], &[port]), [0x0408 | out, 0x1408], "between the two");
+        assert_eq!(see(&[port], &whole), [0x1408, 0x0008], "at the first card");
+        assert_eq!(see(&whole, &[Port::A]), [0x0008, 0x0408 | out], "at the second card");
+        // A link, and a loop that is closed; and a link where there should be none.
+        let Event::Links { status, .. } = links(0, &[Port::A]) else { unreachable!() };
+        let signal = PortState { link: true, closed: true, communication: false };
+        let status = status.with_port(port, signal);
+        watch.handle_event(at(2), &Event::Links { id: DeviceId(0), status });
+        assert_eq!(words(&watch)[0], 0x0208 | out);
+        let other = if port == Port::C { Port::B } else { Port::C };
+        watch.handle_event(at(3), &links(0, &[Port::A, port, other]));
+        assert_eq!(words(&watch)[0], 0x0808 | DeviceState::port_bit(other));
+    }
 }
 
 // proves: HC-15 (U)
@@ -106,10 +145,8 @@ fn links(id: u32, ports: &[Port]) -> Event {
     let mut status = DlStatus(0);
     for port in Port::ALL {
         let open = ports.contains(&port);
-        status = status.with_port(
-            port,
-            linesman_proto::register::PortState { link: open, closed: !open, communication: open },
-        );
+        let state = PortState { link: open, closed: !open, communication: open };
+        status = status.with_port(port, state);
     }
     Event::Links { id: DeviceId(id), status }
 }

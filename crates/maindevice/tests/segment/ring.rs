@@ -1,6 +1,7 @@
 //! Two cards, one ring: every frame goes out by both, and a cut is survived.
 
 use crate::bench::Bench;
+use linesman_config::plan::{Plan, PlanOptions};
 use linesman_maindevice::{Event, Options};
 use linesman_proto::address::Path;
 use linesman_proto::frame::FrameView;
@@ -119,6 +120,100 @@ fn each_card_counts_those_whom_its_received_frames_have_met() {
     bench.segment.inject(bench.now, &FaultEntry::new("device-off".parse().unwrap()).device("B2")).unwrap();
     bench.run_for(Span::s(1));
     assert_eq!(counts(&bench), Some([1, 2]), "B2 has no power");
+}
+
+/// A ring through a box, a coupler and a junction, from which a branch leads away.
+const BRANCHED: &str = r#"
+name = "ring with a branch"
+[[device]]
+name = "B1"
+type = "EP1008-0001"
+on = "maindevice"
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "B1.B"
+[[device]]
+name = "J1"
+type = "EK1122"
+on = "K1.B"
+[[device]]
+name = "X"
+type = "EK1100"
+on = "J1.D"
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+[ring]
+closes_at = "K2.C"
+"#;
+
+/// TwinCAT's `State`: 0x0200 link error, 0x0400 missing link, 0x0800 unexpected link, 0x1000 to 0x8000 port A to D.
+// proves: RED-16 (S)
+#[test]
+fn the_state_words_name_slave_and_port_at_the_place_of_a_break() {
+    let ring = || Options { ring: true, ..Options::default() };
+    let planned = |absent: &[&str], by_order: bool| {
+        let mut bench = Bench::with_options(BRANCHED, ring());
+        for name in absent {
+            bench.segment.unplug(bench.now, name).unwrap();
+        }
+        bench.run_for(Span::ms(100));
+        let inventory = bench.scan();
+        let options = PlanOptions { ports_open_by_order: by_order, ..PlanOptions::default() };
+        let tree = inventory.tree().clone();
+        let plan = Plan::build(&inventory.planned(AlState::Op), tree, &options).unwrap();
+        bench.device.start(bench.now, plan);
+        assert!(bench.run_until(Span::s(30), |event| matches!(event, Event::AllReached)));
+        bench.run_for(Span::s(2));
+        bench
+    };
+    // Who is not in OP with all links as planned, by station addresses, which count from 0x1001.
+    let odd = |bench: &Bench| -> Vec<(u16, u16)> {
+        let status = bench.device.network_status().unwrap();
+        let words = status.devices().iter().map(|one| (one.id().no() as u16, one.state().0));
+        words.filter(|(_, word)| *word != 0x0008).collect()
+    };
+    let open = |bench: &mut Bench, place: &str| {
+        let entry = FaultEntry::new("link-open".parse().unwrap()).at(place);
+        bench.segment.inject(bench.now, &entry).unwrap()
+    };
+    let mut bench = planned(&[], false);
+    assert_eq!(odd(&bench), [], "whole");
+    let [b1, k1, j1, x, k2] = ["B1", "K1", "J1", "X", "K2"].map(|name| bench.id(name).no() as u16);
+    for (cut, words) in [
+        ("maindevice-B1.A", vec![(b1, 0x1408)]),
+        ("B1.B-K1.A", vec![(b1, 0x2408), (k1, 0x1408)]),
+        ("K1.C-K2.A", vec![(k1, 0x4408), (k2, 0x1408)]),
+        ("K2.C-maindevice.B", vec![(k2, 0x4408)]),
+        ("J1.D-X.A", vec![(j1, 0x8408), (x, 0x0101)]),
+    ] {
+        let fault = open(&mut bench, cut);
+        bench.run_for(Span::s(2));
+        assert_eq!(odd(&bench), words, "{cut}");
+        bench.segment.heal(bench.now, fault);
+        bench.run_for(Span::s(8));
+        assert_eq!(odd(&bench), [], "{cut} is mended");
+    }
+    // A link that is up again, and a port that waits for its order.
+    let mut bench = planned(&[], true);
+    let fault = open(&mut bench, "J1.D-X.A");
+    bench.run_for(Span::s(2));
+    bench.segment.heal(bench.now, fault);
+    let mut seen = Vec::new();
+    for _ in 0..800 {
+        bench.run_for(Span::ms(10));
+        seen.extend(odd(&bench));
+    }
+    seen.dedup();
+    assert!(seen.contains(&(j1, 0x8208)), "{seen:04X?}");
+    assert_eq!(odd(&bench), []);
+    // Somebody is plugged in who is not in the plan.
+    let mut bench = planned(&["X"], false);
+    bench.segment.plug(bench.now, "X", None).unwrap();
+    bench.run_for(Span::s(4));
+    assert_eq!(odd(&bench), [(j1, 0x8808)]);
 }
 
 // proves: RED-04

@@ -27,7 +27,7 @@ impl DeviceState {
     pub const DISABLED: u16 = 0x0080;
     /// The SubDevice does not answer.
     pub const NOT_PRESENT: u16 = 0x0100;
-    /// A port has a link but no communication.
+    /// A port has a link but no communication, or its loop is closed all the same.
     pub const LINK_ERROR: u16 = 0x0200;
     /// A port where a neighbour is configured has none.
     pub const MISSING_LINK: u16 = 0x0400;
