@@ -8,6 +8,7 @@ use linesman_proto::time::Span;
 use super::{DevicePlan, IoAt, Plan, Task, reference};
 
 mod hot_connect;
+mod ring_clocks;
 
 /// Share of the wire's time that cyclic frames should leave to others, in percent.
 const MUCH_LOAD: f64 = 80.0;
@@ -101,6 +102,7 @@ impl Plan {
         self.ports(&mut doubts);
         self.groups(&mut doubts);
         self.ring_end(&mut doubts);
+        self.ring_clocks(&mut doubts);
         doubts.sort_by_key(|doubt| std::cmp::Reverse(doubt.severity));
         doubts
     }

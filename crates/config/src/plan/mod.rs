@@ -108,6 +108,18 @@ pub struct Plan {
     pub ports_open_by_order: bool,
     /// Groups that join and leave while the network runs.
     pub groups: Vec<HotConnectGroup>,
+    /// What is said of the clocks of its ring.
+    pub ring_clocks: RingClocks,
+}
+
+/// What a project says of the clocks of its ring (RED-12).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct RingClocks {
+    /// The ports of a port multiplier (CU2508) at which the ring begins and ends, counted from 1; `None`: it hangs at
+    /// cards.
+    pub port_multiplier: Option<[u8; 2]>,
+    /// Clocks in the ring without a port multiplier are an error.
+    pub need_port_multiplier: bool,
 }
 
 /// What one SubDevice is set up with.
@@ -202,6 +214,7 @@ impl Plan {
             base_tick: Span::ms(1),
             ports_open_by_order: false,
             groups: Vec::new(),
+            ring_clocks: RingClocks { port_multiplier: None, need_port_multiplier: false },
         }
     }
 

@@ -23,6 +23,7 @@ mod from_esi;
 mod group;
 mod resolve;
 mod time;
+mod ring;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -47,6 +48,7 @@ pub use ethernet::EthernetChoice;
 pub use group::{IdentificationChoice, IdentificationWay, ProjectGroup};
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
 pub use time::{SyncLeader, TimeChoice, TimeStampForm};
+pub use ring::Ring;
 
 /// A project.
 #[derive(Clone, PartialEq, Eq, Debug, Deserialize)]
@@ -74,15 +76,6 @@ pub struct Project {
     /// Where a second card closes a ring, if it does.
     #[serde(default)]
     pub ring: Option<Ring>,
-}
-
-/// The far end of a ring.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct Ring {
-    /// The port that is wired to the second card, such as `B9.B`.
-    pub closes_at: Attachment,
 }
 
 /// A project that cannot be used.
@@ -184,7 +177,7 @@ impl Project {
         });
         let ring = tree
             .closes_at()
-            .map(|(node, port)| Ring { closes_at: Attachment::Device { name: label(node), port } });
+            .map(|(node, port)| Ring::closing_at(Attachment::Device { name: label(node), port }));
         let devices = devices.collect();
         Self { ring, ..Self::of(name, devices) }
     }
@@ -236,6 +229,9 @@ impl Project {
         }
         if self.network.base_time_us == 0 {
             return value("network".to_owned(), "base_time_us is 0, expected a time in µs");
+        }
+        if let Some(Err(reason)) = self.ring.as_ref().map(Ring::pair) {
+            return Err(ProjectError::Value { whose: "[ring]".to_owned(), reason });
         }
         let mut stations = BTreeMap::new();
         for (device, station) in self.devices.iter().zip(self.stations()) {
@@ -344,7 +340,7 @@ impl Project {
             let _ = writeln!(text, "\n[[task]]\n{}", lines(task));
         }
         if let Some(ring) = &self.ring {
-            let _ = write!(text, "\n[ring]\ncloses_at = {}\n", quoted(&ring.closes_at.to_string()));
+            let _ = writeln!(text, "\n[ring]\n{}", lines(ring));
         }
         for device in &self.devices {
             device.write(&mut text);

@@ -9,7 +9,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_proto::topology::Tree;
 
-use super::{Project, ProjectDevice, ProjectError};
+use super::{Project, ProjectDevice, ProjectError, Ring};
 use crate::esi::value;
 use crate::identity::RevisionRule;
 use crate::plan::layout::PlanOptions;
@@ -133,6 +133,7 @@ impl Project {
         let mut options = self.network.options(&self.tasks);
         options.groups = self.planned_groups(&tree, &places);
         options.time_source = self.planned_time(&places);
+        options.ring_clocks = self.ring.as_ref().map(Ring::clocks).unwrap_or_default();
         Ok(Resolved { devices, tree: tree.in_processing_order(), options, places })
     }
 

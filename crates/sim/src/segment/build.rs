@@ -113,7 +113,7 @@ pub(super) fn build(file: &SegmentFile) -> Result<Segment, BuildError> {
     let place =
         |(id, planned)| Placed { id, planned, revision: None, alias: None, wiring_of: None };
     let mut placed: Vec<Placed> = ids.zip(planned).map(place).collect();
-    let mut ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
+    let mut ring = file.ring.as_ref().map(|ring| Ring::closing_at(ring.closes_at.clone()));
     for (index, entry) in file.faults.iter().enumerate() {
         let label = label(index);
         if let Some(replacement) = fault::replacement(&label, entry)? {
@@ -434,7 +434,7 @@ fn remove(placed: &mut Vec<Placed>, device: &str, ring: &mut Option<Ring>) {
                     heir = Some(child.id);
                 } else if ring.as_ref().is_some_and(|ring| ring.closes_at == here) {
                     *ring = match &on {
-                        Attachment::Device { .. } => Some(Ring { closes_at: on.clone() }),
+                        Attachment::Device { .. } => Some(Ring::closing_at(on.clone())),
                         Attachment::MainDevice(_) => None,
                     };
                     return drop_orphans(placed, ring);

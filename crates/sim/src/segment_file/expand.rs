@@ -445,7 +445,7 @@ pub(crate) fn wiring(file: &SegmentFile, planned: &[Planned]) -> Project {
         entry: controller.entry.to_string(),
         ..ProjectDevice::at(&controller.name, controller.on.clone())
     });
-    let ring = file.ring.as_ref().map(|ring| Ring { closes_at: ring.closes_at.clone() });
+    let ring = file.ring.as_ref().map(|ring| Ring::closing_at(ring.closes_at.clone()));
     Project { ring, ..Project::of(&file.name, devices.collect()) }
 }
 

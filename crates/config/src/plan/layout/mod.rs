@@ -23,7 +23,7 @@ use self::area::Run;
 use self::group::{Group, groups};
 use super::{
     DatagramPlan, DevicePlan, FramePlan, HotConnectGroup, IoAt, Ownership, Plan, PlannedDevice,
-    Role, SyncUnit, Task, TimeSource,
+    RingClocks, Role, SyncUnit, Task, TimeSource,
 };
 use crate::profile::ProcessSyncManager;
 
@@ -74,6 +74,8 @@ pub struct PlanOptions {
     pub ports_open_by_order: bool,
     /// Groups that join and leave while the network runs.
     pub groups: Vec<HotConnectGroup>,
+    /// What is said of the clocks of its ring.
+    pub ring_clocks: RingClocks,
 }
 
 impl Default for PlanOptions {
@@ -94,6 +96,7 @@ impl Default for PlanOptions {
             base_tick: Span::ms(1),
             ports_open_by_order: false,
             groups: Vec::new(),
+            ring_clocks: RingClocks::default(),
         }
     }
 }
@@ -205,6 +208,7 @@ impl Plan {
             base_tick: options.base_tick,
             ports_open_by_order: options.ports_open_by_order,
             groups: options.groups.clone(),
+            ring_clocks: options.ring_clocks,
             ..Self::empty(tree)
         };
         let tasks = match options.tasks.as_slice() {

@@ -1,4 +1,4 @@
-use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::address::{DeviceId, RegisterAddress, WorkingCounter};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::port::Port;
@@ -6,7 +6,9 @@ use linesman_proto::topology::End;
 
 use super::*;
 use crate::compare::{Comparison, Difference};
-use crate::plan::{Doubt, Plan, Role};
+use crate::identity::{Identity, Mismatch, mismatch};
+use crate::plan::expect::expect;
+use crate::plan::{Doubt, PathView, Plan, Presence, Role, Served};
 
 /// A coupler with a branch, and a tool behind it: a coupler with a selector and two terminals.
 const MACHINE: &str = r#"name = "machine"
@@ -360,6 +362,86 @@ fn ring(closes_at: &str) -> String {
     };
     let line = coupler("K1", "maindevice") + &coupler("K2", "K1.C") + &coupler("K3", "K2.C");
     format!("[ring]\ncloses_at = \"{closes_at}\"\n{line}")
+}
+
+/// What a plan says of each place, compared with who is found there.
+// proves: HC-03 (U)
+#[test]
+fn who_is_found_is_compared_by_position_with_the_rule_that_was_chosen() {
+    let device = |name: &str, on: &str, more: &str| {
+        format!(
+            "[[device]]\nname = \"{name}\"\non = \"{on}\"\nvendor_id = 2\nproduct_code = 5\nrevision = 0x00120003\n{more}\n\
+             description = {{ ports = \"YY--\" }}\n"
+        )
+    };
+    let rules = [
+        ("", 0x0012_0003, 0x0013_0003),
+        ("revision_rule = \"any\"", 0, 0),
+        ("revision_rule = \"equal-or-greater\"", 0x0013_0000, 0x0012_0002),
+        ("revision_rule = \"low-word-equal\"", 0x0001_0003, 0x0012_0004),
+        ("revision_rule = \"low-word-equal-high-word-equal-or-greater\"", 0x0013_0003, 0x0011_0003),
+        ("revision_rule = \"high-word-equal\"", 0x0012_0009, 0x0013_0003),
+        ("revision_rule = \"high-word-equal-or-greater\"", 0x0013_0000, 0x0011_0003),
+    ];
+    let mut text = device("D0", "maindevice", "serial = 4711");
+    for (at, (rule, ..)) in rules.iter().enumerate() {
+        text += &device(&format!("D{}", at + 1), &format!("D{at}.B"), rule);
+    }
+    let plan = plan(&text);
+    let compared = |at: usize, found: Identity| {
+        let planned = &plan.devices[at];
+        mismatch(&planned.identity, &found, planned.revision_rule)
+    };
+    let right =
+        Identity { vendor_id: 2, product_code: 5, revision: 0x0012_0003, serial_number: 4711 };
+    for at in 0..plan.devices.len() {
+        assert_eq!(compared(at, right), None, "{at}");
+        let vendor = Identity { vendor_id: 3, ..right };
+        assert_eq!(compared(at, vendor), Some(Mismatch::Vendor), "{at}");
+        let product = Identity { product_code: 6, ..right };
+        assert_eq!(compared(at, product), Some(Mismatch::Product), "{at}");
+        let other_serial = Identity { serial_number: 4712, ..right };
+        let expected = (at == 0).then_some(Mismatch::Serial);
+        assert_eq!(compared(at, other_serial), expected, "only the first place names a serial: {at}");
+    }
+    for (at, (rule, accepted, refused)) in rules.into_iter().enumerate() {
+        let found = |revision| compared(at + 1, Identity { revision, ..right });
+        assert_eq!(found(accepted), None, "{rule} 0x{accepted:08X}");
+        let expected = (!rule.contains("any")).then_some(Mismatch::Revision);
+        assert_eq!(found(refused), expected, "{rule} 0x{refused:08X}");
+    }
+}
+
+/// The `RemovableBranch` of the source (S0 L1236-1250): a working counter of its own, and those of all others are the
+/// same without it.
+// proves: HC-11 (U)
+#[test]
+fn a_branch_in_a_sync_unit_of_its_own_has_datagrams_of_its_own() {
+    let text = MACHINE[..MACHINE.find("[[group]]").unwrap()]
+        .replace("name = \"T2\"", "name = \"T2\"\nsync_unit = \"RemovableBranch\"")
+        .replace("name = \"T3\"", "name = \"T3\"\nsync_unit = \"RemovableBranch\"");
+    let plan = plan(&text);
+    let branch: Vec<DeviceId> = (plan.devices.iter())
+        .filter(|device| ["T2", "T3"].contains(&device.name.as_str()))
+        .map(|device| device.id)
+        .collect();
+    let full = Presence::full(plan.devices.len());
+    let mut without = full.clone();
+    branch.iter().for_each(|id| without.set(*id, Served::default()));
+    let mut of_branch = 0;
+    for (.., datagram) in plan.datagrams().filter(|(.., one)| one.role == Role::ProcessData) {
+        let owners = datagram.ownership.iter().map(|own| branch.contains(&own.device));
+        let owners: Vec<bool> = owners.collect();
+        assert!(owners.iter().all(|is_branch| *is_branch == owners[0]), "{datagram:?}");
+        let counter = |presence| expect(datagram, presence, PathView::Merged);
+        if owners[0] {
+            of_branch += 1;
+            assert_eq!(counter(&without), WorkingCounter(0), "{datagram:?}");
+        } else {
+            assert_eq!(counter(&without), counter(&full), "{datagram:?}");
+        }
+    }
+    assert!(of_branch > 0 && plan.datagrams().count() > of_branch);
 }
 
 // proves: RED-07
