@@ -9,6 +9,7 @@ mod clocks;
 mod described;
 mod ethernet;
 mod hot_connect;
+mod identity;
 mod library;
 mod loop_control;
 mod mailbox;
