@@ -117,7 +117,10 @@ mod tests {
             ("\"X2\", \"X3\"", Some("[ring]: port_multiplier: X2 and X3 are no pair")),
             ("\"X2\", \"X1\"", Some("are no pair: expected X1 and X2, X3 and X4")),
             ("\"X1\", \"X4\"", Some("are no pair")),
-            ("\"X7\", \"X9\"", Some("`X9` is no port of a CU2508 for SubDevices: expected X1 to X8")),
+            (
+                "\"X7\", \"X9\"",
+                Some("`X9` is no port of a CU2508 for SubDevices: expected X1 to X8"),
+            ),
             ("\"1\", \"2\"", Some("`1` is no port")),
         ] {
             let text = project(&format!("port_multiplier = [{pair}]"), &multiplier(""));
@@ -133,7 +136,10 @@ mod tests {
         }
         let needed = doubts(&project("clocks_need_port_multiplier = true", ""));
         assert!(matches!(needed[..], [(Severity::Error, _)]), "{needed:?}");
-        assert!(needed[0].1.text.contains("clocks in a ring without a port multiplier"), "{needed:?}");
+        assert!(
+            needed[0].1.text.contains("clocks in a ring without a port multiplier"),
+            "{needed:?}"
+        );
         let told = doubts(&project("", ""));
         assert!(matches!(told[..], [(Severity::Info, _)]), "{told:?}");
         assert!(told[0].1.advice.contains("TwinCAT"), "{told:?}");
@@ -160,7 +166,8 @@ mod tests {
     #[test]
     fn a_ring_without_clocks_has_no_such_doubt() {
         let text = project("clocks_need_port_multiplier = true", "");
-        let text = text.replace("clock = { assign_activate = 0x0300, sync0_cycle_us = 1000 }\n", "");
+        let text =
+            text.replace("clock = { assign_activate = 0x0300, sync0_cycle_us = 1000 }\n", "");
         assert!(doubts(&text).is_empty());
     }
 }

@@ -454,6 +454,12 @@ impl MainDevice {
         self.exchange.responding_by_card()
     }
 
+    /// True if what one card of a ring sends arrives at the other; `None` before the first frame, and without a ring.
+    #[must_use]
+    pub fn ring_intact(&self) -> Option<bool> {
+        self.exchange.ring_intact()
+    }
+
     /// The running plan.
     #[must_use]
     pub fn plan(&self) -> Option<&Plan> {

@@ -55,6 +55,8 @@ pub(crate) struct SeenClock {
     pub(crate) latched: u64,
     /// How long after the first clock of its line it did. `None` without a clock.
     pub(crate) delay: Option<Span>,
+    /// The card whose frame it was: of an open ring each card latches its half.
+    pub(crate) card: Path,
 }
 
 /// What a latch found, in the order of processing.
@@ -117,7 +119,7 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
             Some(DcTime32(u32::from_le_bytes(times.bytes(4 * port.index()))))
         };
         controllers.push(SeenController { open, received: PortMap::from_fn(received) });
-        clocks.push(SeenClock { station, has_clock, is_wide, latched, delay: None });
+        clocks.push(SeenClock { station, has_clock, is_wide, latched, delay: None, card: Path::A });
     }
     let half = places.iter().position(|place| place.card() == Some(Path::B));
     let half = half.filter(|_| wire.ring_intact() == Some(false)).unwrap_or(places.len());
@@ -131,6 +133,7 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
         let delays = Delays::measure(&tree, path, &received, THROUGH_UNIT)?;
         for (node, clock) in clocks[range].iter_mut().enumerate() {
             clock.delay = delays.of(node).map(|delay| delay.from_reference);
+            clock.card = path;
         }
     }
     Ok(Latch { at, clocks })

@@ -1,5 +1,7 @@
 //! The clocks of a network: who is the reference, when they are set, whether they follow.
 
+use std::sync::{Arc, Mutex};
+
 use linesman_config::plan::{ClockSettings, Plan, Role};
 use linesman_proto::address::{DeviceId, Position, StationAddress};
 use linesman_proto::frame::builder::DatagramAddress;
@@ -8,10 +10,10 @@ use linesman_proto::register::{self, DlControl, LoopMode};
 use linesman_proto::time::Span;
 
 use super::times::Phase;
-use super::{Context, Reachability};
+use super::{Context, DeviceTable, Reachability};
 use crate::event::Event;
 use crate::exchange::Target;
-use crate::executor::lock;
+use crate::executor::{Wire, lock};
 use crate::procedure::clock::{self, ClockError, Latch, SeenClock};
 use crate::procedure::state::StepError;
 
@@ -19,6 +21,8 @@ use crate::procedure::state::StepError;
 const OPENED: Span = Span::s(1);
 /// And frames have shown by then that it is.
 const SEEN: Span = Span::ms(20);
+/// How often it is looked whether another one has done with latching.
+const LATCH_LOOK: Span = Span::us(500);
 /// How often a clock that settles is looked at.
 const LOOK: Span = Span::ms(2);
 
@@ -90,9 +94,27 @@ fn tell(context: &Context, outcome: &Result<StationAddress, ClockError>) {
     });
 }
 
+/// The right to latch receive times, as long as it is kept.
+pub(super) struct LatchRight(Arc<Mutex<DeviceTable>>);
+
+impl Drop for LatchRight {
+    fn drop(&mut self) {
+        lock(&self.0).is_latching = false;
+    }
+}
+
+/// Waits until nobody else latches receive times: what one has latched, another one would latch anew before it is read.
+pub(super) async fn latch_alone(context: &Context) -> LatchRight {
+    while std::mem::replace(&mut lock(&context.device_table).is_latching, true) {
+        context.wire.sleep(LATCH_LOOK).await;
+    }
+    LatchRight(Arc::clone(&context.device_table))
+}
+
 /// Sets the clocks of all, or of one that came back later.
 async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress, ClockError> {
     let wire = &context.wire;
+    let alone = latch_alone(context).await;
     let opened = open_ring(context).await?;
     let latched = clock::latch(wire, context.network).await;
     if let Some((station, control)) = opened {
@@ -100,12 +122,23 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
         let _ = wire.write_one(station, register::DL_CONTROL.address, &bytes).await;
         lock(&context.device_table).opened_until = wire.now() + SEEN;
     }
+    drop(alone);
     let Latch { at, clocks } = latched?;
     let epoch = context.epoch();
     let reference = choose(&context.plan, &clocks)?;
     let found = |clock: &&SeenClock| clock.station == reference;
     let of_reference = clocks.iter().find(found).cloned();
     let of_reference = of_reference.ok_or(ClockError::NoReference("it does not answer"))?;
+    let newcomer = one.and_then(|id| Some((id, context.plan.device(id)?.station)));
+    let newcomer = newcomer.and_then(|(id, station)| {
+        let clock = clocks.iter().find(|clock| clock.has_clock && clock.station == station)?;
+        (clock.card != of_reference.card).then_some((id, clock))
+    });
+    if let Some((id, clock)) = newcomer {
+        let by_host = epoch.0.wrapping_add(at.as_nanos());
+        set_beside(context, id, clock, &clocks, by_host).await?;
+        return Ok(reference);
+    }
     let zero = of_reference.delay.unwrap_or_default();
     // Who comes before the reference never sees its time.
     let behind = |clock: &SeenClock| {
@@ -126,11 +159,7 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     let time = match source {
         None => by_host,
         Some((clock, behind)) => {
-            let offset = clock::time(wire, clock.station, &register::SYSTEM_TIME_OFFSET).await?;
-            let time = offset.wrapping_add(clock.latched).wrapping_sub(behind.as_nanos());
-            // Some clocks have the low half only; the other one is that of the time nearby.
-            let off = time.wrapping_sub(by_host) as u32 as i32;
-            by_host.wrapping_add_signed(off.into())
+            time_at_latch(wire, clock, by_host).await?.wrapping_sub(behind.as_nanos())
         }
     };
     let setting: Vec<_> = (context.plan.devices.iter())
@@ -161,6 +190,48 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     device_table.set_clock_epoch(epoch);
     drop(device_table);
     Ok(reference)
+}
+
+/// The time that a clock which is set showed when it was latched; `by_host` is nearly the same time.
+async fn time_at_latch(wire: &Wire, clock: &SeenClock, by_host: u64) -> Result<u64, ClockError> {
+    let offset = clock::time(wire, clock.station, &register::SYSTEM_TIME_OFFSET).await?;
+    let time = offset.wrapping_add(clock.latched);
+    // Some clocks have the low half only; the other one is that of the time nearby.
+    let off = time.wrapping_sub(by_host) as u32 as i32;
+    Ok(by_host.wrapping_add_signed(off.into()))
+}
+
+/// Sets the clock of one that came back behind the place where the ring is open, where the reference is not. Frames pass
+/// the processing units there in the same order as in the whole ring: time and delay follow from those of another
+/// SubDevice of that half.
+async fn set_beside(
+    context: &Context,
+    id: DeviceId,
+    clock: &SeenClock,
+    clocks: &[SeenClock],
+    by_host: u64,
+) -> Result<(), ClockError> {
+    let wire = &context.wire;
+    let with_time: Vec<StationAddress> = lock(&context.device_table).with_time().collect();
+    let is_beside = |other: &&SeenClock| {
+        other.card == clock.card
+            && other.station != clock.station
+            && with_time.contains(&other.station)
+    };
+    let beside = clocks.iter().filter(is_beside);
+    let beside = beside.clone().find_map(|other| Some((other, other.delay?)));
+    let nobody = ClockError::NoReference("nobody in its half of the open ring shows the time");
+    let ((other, delay), own_delay) = beside.zip(clock.delay).ok_or(nobody)?;
+    let later = (own_delay.as_nanos() as i64).wrapping_sub(delay.as_nanos() as i64);
+    let time = time_at_latch(wire, other, by_host).await?.wrapping_add_signed(later);
+    let offset = time.wrapping_sub(clock.latched);
+    let told = register::SYSTEM_TIME_DELAY;
+    let reply = wire.read_one(Target::Station(other.station), told.address, told.len).await?;
+    let told = i64::from(u32::from_le_bytes(reply.bytes(0)));
+    let delay = Span::ns(told.saturating_add(later).max(0).unsigned_abs());
+    clock::set(wire, clock.station, offset, delay).await?;
+    lock(&context.device_table).set_clock(id, clock.is_wide);
+    Ok(())
 }
 
 /// In a closed ring no frame comes back to the ports it left by: the last port is closed for as long

@@ -108,6 +108,8 @@ pub(crate) struct DeviceTable {
     second_card_ns: Option<i64>,
     /// Until when the ring is open by an order of our own, or may seem to be.
     pub(crate) opened_until: Instant,
+    /// Receive times are being latched and read.
+    pub(super) is_latching: bool,
 }
 
 impl DeviceTable {

@@ -41,9 +41,13 @@ pub(crate) struct Bench {
     pub(crate) tamper: Option<Tamper>,
     /// Whose process data are judged in each cycle, when its frames are back or given up.
     pub(crate) judged: Option<DeviceId>,
+    /// Others that are judged together with it.
+    pub(crate) judged_too: Vec<DeviceId>,
     /// How many cycles were judged, and in how many the data were not valid.
     pub(crate) cycles: u64,
     pub(crate) bad_cycles: u64,
+    /// When that was.
+    pub(crate) bad_at: Vec<Instant>,
     /// What crosses the cards, if anybody wants to know: by which card, whether it comes back, and the frame.
     pub(crate) crossed: Option<Vec<(Path, bool, Vec<u8>)>>,
     /// How long after it was given away a frame leaves the card: programs that run before it.
@@ -71,8 +75,10 @@ impl Bench {
             events: Vec::new(),
             tamper: None,
             judged: None,
+            judged_too: Vec::new(),
             cycles: 0,
             bad_cycles: 0,
+            bad_at: Vec::new(),
             crossed: None,
             leaves_after: None,
             arrivals: 0,
@@ -146,7 +152,11 @@ impl Bench {
             && self.device.take_exchanged(0)
         {
             self.cycles += 1;
-            self.bad_cycles += u64::from(!self.device.quality(id).valid);
+            let is_valid = |id: DeviceId| self.device.quality(id).valid;
+            if !is_valid(id) || !self.judged_too.iter().all(|id| is_valid(*id)) {
+                self.bad_cycles += 1;
+                self.bad_at.push(self.now);
+            }
         }
     }
 

@@ -64,14 +64,14 @@ on = "K2.B"
 "#;
 
 /// What happened, without what was read.
-fn story(bench: &Bench) -> String {
+pub(crate) fn story(bench: &Bench) -> String {
     let is_read = |event: &Event| matches!(event, Event::Counters { .. } | Event::Links { .. });
     let events = bench.events.iter().filter(|(_, event)| !is_read(event));
     events.map(|(at, event)| format!("{at:?} {event:?}\n")).collect()
 }
 
 /// How a selector is read, as the SII says.
-fn source(profile: &DeviceProfile) -> IdentificationSource {
+pub(crate) fn source(profile: &DeviceProfile) -> IdentificationSource {
     match profile.identification {
         Identification::AlStatus => IdentificationSource::AlStatus,
         Identification::Memory(at) => IdentificationSource::Memory(at),

@@ -136,11 +136,8 @@ fn an_alias_that_the_maindevice_has_written_tells_a_subdevice_after_the_next_pow
     );
     let with_number = |value: u32| {
         let mut plan = as_built.clone();
-        let check = IdentificationCheck {
-            source: IdentificationSource::Alias,
-            value,
-            compulsory: true,
-        };
+        let check =
+            IdentificationCheck { source: IdentificationSource::Alias, value, compulsory: true };
         plan.devices[2].settings.identification = Some(check);
         plan
     };
@@ -157,7 +154,8 @@ fn an_alias_that_the_maindevice_has_written_tells_a_subdevice_after_the_next_pow
     image[at.byte()..at.byte() + 2].copy_from_slice(&300_u16.to_le_bytes());
     let checksum = checksum(image.first_chunk().unwrap());
     for (at, data) in [(at, 300_u16), (CHECKSUM, checksum.into())] {
-        let written = serve(&mut bench, t3, Service::WriteSii { at, data: data.to_le_bytes().to_vec() });
+        let written =
+            serve(&mut bench, t3, Service::WriteSii { at, data: data.to_le_bytes().to_vec() });
         assert!(matches!(written, ServiceAnswer::Written { words: 1 }), "{written:?}");
     }
     assert_eq!(alias_in_use(&mut bench, t3), [0, 0], "it is loaded at power-on");

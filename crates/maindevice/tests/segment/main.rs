@@ -18,6 +18,8 @@ mod many;
 mod network_time;
 mod reference_clock;
 mod ring;
+#[allow(clippy::disallowed_macros, reason = "it prints tables for people")]
+mod ring_soak;
 mod robust;
 mod rounds;
 mod run;

@@ -99,7 +99,8 @@ fn each_frame_leaves_by_both_cards_and_only_the_copy_of_card_a_is_counted() {
 fn each_card_counts_those_whom_its_received_frames_have_met() {
     let mut bench = bench();
     bench.start(AlState::Op);
-    let counts = |bench: &Bench| bench.device.responding_by_card().map(|both| both.map(|one| one.0));
+    let counts =
+        |bench: &Bench| bench.device.responding_by_card().map(|both| both.map(|one| one.0));
     bench.run_for(Span::ms(10));
     assert_eq!(counts(&bench), Some([0, 4]), "whole: the second card counts every SubDevice");
     for (cut, halves) in [
@@ -117,7 +118,10 @@ fn each_card_counts_those_whom_its_received_frames_have_met() {
         bench.run_for(Span::s(5));
         assert_eq!(counts(&bench), Some([0, 4]), "{cut} is mended");
     }
-    bench.segment.inject(bench.now, &FaultEntry::new("device-off".parse().unwrap()).device("B2")).unwrap();
+    bench
+        .segment
+        .inject(bench.now, &FaultEntry::new("device-off".parse().unwrap()).device("B2"))
+        .unwrap();
     bench.run_for(Span::s(1));
     assert_eq!(counts(&bench), Some([1, 2]), "B2 has no power");
 }

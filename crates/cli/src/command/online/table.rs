@@ -1,5 +1,6 @@
 //! All SubDevices and frames as a table.
 
+use linesman_proto::state::NetworkState;
 use linesman_runtime::online::report::{
     Count, FrameCounts, OnlineDevice, OnlinePort, OnlineReport,
 };
@@ -165,9 +166,8 @@ fn mailbox(device: &OnlineDevice) -> String {
 
 /// `Ring: 0 SubDevices counted in what card A receives, 9 in that of card B: it is whole.`
 fn by_card(report: &OnlineReport, [of_a, of_b]: [u16; 2]) -> String {
-    // A frame that meets all of them has gone all round, from one card to the other.
-    let is_whole = of_a == 0 && u32::from(of_b) == report.present;
-    let state = if is_whole { "whole" } else { "open, or not all of it answers" };
+    let is_open = report.state.word & NetworkState::REDUNDANCY_FRAME_MISSING != 0;
+    let state = if is_open { "open" } else { "whole" };
     format!(
         "Ring: {} counted in what card A receives, {of_b} in that of card B: it is {state}.\n",
         count(of_a.into(), "SubDevice")

@@ -46,7 +46,9 @@ impl Plan {
                     self.name(reference),
                     self.name(multiplier)
                 ),
-                advice: "make the port multiplier the reference clock (`clock = { reference = true }`)".to_owned(),
+                advice:
+                    "make the port multiplier the reference clock (`clock = { reference = true }`)"
+                        .to_owned(),
             });
         }
     }
@@ -55,10 +57,14 @@ impl Plan {
     fn without_multiplier(&self, reference: DeviceId) -> Doubt {
         let is_needed = self.ring_clocks.need_port_multiplier;
         let advice = match is_needed {
-            true => "hang the ring at a CU2508 (`port_multiplier = [\"X1\", \"X2\"]`), or leave out \
-                     `clocks_need_port_multiplier`: `linesman run` needs none",
-            false => "none is needed for `linesman run`; TwinCAT asks for a CU2508 (`clocks_need_port_multiplier = true` \
-                      in [ring] makes this an error)",
+            true => {
+                "hang the ring at a CU2508 (`port_multiplier = [\"X1\", \"X2\"]`), or leave out \
+                     `clocks_need_port_multiplier`: `linesman run` needs none"
+            }
+            false => {
+                "none is needed for `linesman run`; TwinCAT asks for a CU2508 (`clocks_need_port_multiplier = true` \
+                      in [ring] makes this an error)"
+            }
         };
         Doubt {
             severity: if is_needed { Severity::Error } else { Severity::Info },

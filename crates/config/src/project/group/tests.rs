@@ -402,7 +402,11 @@ fn who_is_found_is_compared_by_position_with_the_rule_that_was_chosen() {
         assert_eq!(compared(at, product), Some(Mismatch::Product), "{at}");
         let other_serial = Identity { serial_number: 4712, ..right };
         let expected = (at == 0).then_some(Mismatch::Serial);
-        assert_eq!(compared(at, other_serial), expected, "only the first place names a serial: {at}");
+        assert_eq!(
+            compared(at, other_serial),
+            expected,
+            "only the first place names a serial: {at}"
+        );
     }
     for (at, (rule, accepted, refused)) in rules.into_iter().enumerate() {
         let found = |revision| compared(at + 1, Identity { revision, ..right });
