@@ -12,6 +12,7 @@ mod device;
 mod entry;
 mod group_status;
 mod network_status;
+mod topology;
 mod wording;
 
 use std::collections::VecDeque;
@@ -29,6 +30,7 @@ pub use device::{AbnormalChange, WatchedDevice};
 pub use entry::{EntryKind, LogEntry, Severity};
 pub use group_status::GroupStatus;
 pub use network_status::NetworkStatus;
+pub use topology::TopologyEntry;
 
 /// So many entries wait for somebody who fetches them; older ones are dropped and counted.
 const WAITING_ENTRIES: usize = 10_000;

@@ -100,6 +100,33 @@ fn groups_stand_last_in_the_topology_list_with_planned_and_present_counts() {
     assert_eq!(watch.network_status().topology_order(), order);
 }
 
+// proves: PLC-10 (U) partial: whether a clock has 64 bits, and groups at wrong ports, are not told there
+#[test]
+fn the_topology_list_has_64_bytes_each_with_neighbours_state_and_counts_of_groups() {
+    let mut watch = watch_with_group();
+    let list = |watch: &Watch| watch.network_status().topology(watch.plan());
+    for id in [0, 1, 3] {
+        watch.handle_event(at(1), &state(id, AlState::Op, false, 0));
+    }
+    let all = list(&watch);
+    assert_eq!(all.iter().map(|one| one.id.0).collect::<Vec<_>>(), [0, 3, 4, 5, 6, 1, 2]);
+    let words = |entry: &TopologyEntry| {
+        let bytes = entry.to_bytes();
+        assert_eq!(bytes.len(), 64);
+        let words = bytes.chunks_exact(2).map(|word| u16::from_le_bytes([word[0], word[1]]));
+        words.collect::<Vec<u16>>()
+    };
+    // Own addresses; station addresses at A to D; places at A to D; reserved; status; counts; reserved.
+    let coupler = [0x1015, 0, 0, 0x1016, 0, 0, 0, 0xFFFF, 0, 0];
+    assert_eq!(words(&all[0])[..10], coupler);
+    assert_eq!(words(&all[0])[18..22], [4, 0, 2, 1], "there; two planned in groups, one there");
+    let first_of_group = [0x1016, 0xFFFF, 0x1015, 0x1017, 0, 0, 0, 0xFFFE, 0, 0];
+    assert_eq!(words(&all[5])[..10], first_of_group);
+    assert_eq!(words(&all[5])[18], 4 | 8 | 16, "there, first of a group, in a group");
+    assert_eq!(words(&all[6])[18..22], [16, 0, 2, 1], "not there, in a group");
+    assert!(words(&all[6])[10..18].iter().chain(&words(&all[6])[22..]).all(|word| *word == 0));
+}
+
 #[test]
 fn a_group_that_joins_and_leaves_is_told_and_its_absence_is_no_error() {
     let mut watch = watch_with_group();
