@@ -79,7 +79,8 @@ fn is_yes(value: &bool) -> bool {
 
 impl IdentificationChoice {
     /// The number, its own or that of the device; `None` where there is none.
-    fn number(&self, device: &ProjectDevice) -> Option<u32> {
+    #[must_use]
+    pub fn number(&self, device: &ProjectDevice) -> Option<u32> {
         let of_device = match self.by {
             IdentificationWay::Selector => None,
             IdentificationWay::Alias => device.alias.map(u32::from),
