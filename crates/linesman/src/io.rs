@@ -150,6 +150,19 @@ impl<'a> Io<'a> {
         self.inner.present()
     }
 
+    /// True if a hot connect group of this name is plugged in, and all of it have reached their states; `None` if the plan
+    /// has none of that name.
+    #[must_use]
+    pub fn has_joined(&self, group: &str) -> Option<bool> {
+        self.inner.has_joined(group)
+    }
+
+    /// Numbers of SubDevices of hot connect groups: planned, and there (HC-15).
+    #[must_use]
+    pub fn hot_connect_counts(&self) -> (usize, usize) {
+        self.inner.hot_connect_counts()
+    }
+
     /// Numbers of SubDevices that had processed what each card of a ring received of the last broadcast read, card A
     /// first (RED-15): `[0, all]` while the ring is whole, each card's half while it is open. `None` without a ring,
     /// and before the first cycle.

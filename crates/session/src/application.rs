@@ -2,7 +2,7 @@
 
 use linesman_config::plan::Plan;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
-use linesman_maindevice::watch::NetworkStatus;
+use linesman_maindevice::watch::{GroupStatus, NetworkStatus};
 use linesman_maindevice::{FrameStatus, MainDevice, OutsideTime, Quality, Statistics, TaskTimes};
 use linesman_proto::address::DeviceId;
 use linesman_proto::state::{DeviceState, NetworkState};
@@ -160,6 +160,20 @@ impl Io<'_> {
     #[must_use]
     pub fn present(&self) -> usize {
         self.main.network_status().map_or(0, NetworkStatus::present)
+    }
+
+    /// Whether a hot connect group of this name is plugged in, and all of it have reached their states; `None` if the plan
+    /// has none of that name.
+    #[must_use]
+    pub fn has_joined(&self, group: &str) -> Option<bool> {
+        let groups = self.main.network_status()?.groups();
+        groups.iter().find(|one| one.name() == group).map(GroupStatus::has_joined)
+    }
+
+    /// How many SubDevices of hot connect groups are planned, and how many of them are there (HC-15).
+    #[must_use]
+    pub fn hot_connect_counts(&self) -> (usize, usize) {
+        self.main.network_status().map_or((0, 0), NetworkStatus::hot_connect_counts)
     }
 
     /// How many SubDevices had processed what each card of a ring received of the last broadcast read, card A first

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
+use crate::support::running::Running;
 use crate::support::{Run, assert_valid, linesman};
 use serde_json::json;
 use tempfile::TempDir;
@@ -156,6 +157,27 @@ fn plan_lists_groups_and_refuses_what_cannot_work() {
     let run = machine.plan(&[]);
     assert_eq!(run.status, 1, "{}", run.all());
     assert!(run.stdout.contains("the first SubDevice of the line"), "{}", run.all());
+}
+
+// proves: PLC-10 (S) partial: neighbours and groups as JSON
+#[test]
+fn online_tells_groups_that_join_and_leave_and_lists_them_last() {
+    let machine = Machine::new(GROUP);
+    let project = fs::read_to_string(machine.path("project.toml")).unwrap();
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"J1.D-X.A\"\nfrom_ms = 8000\n";
+    let running = Running::with(&format!("{PLANT}{cut}"), &[("project.toml", &project)]);
+    let report = running.until("joins", |report| report["groups"][0]["joined"] == true);
+    assert_valid(&report, "online");
+    let tool = |present: u32, joined: bool, place: Option<&str>| json!([{ "name": "tool", "devices": [4, 5], "present": present, "joined": joined, "place": place }]);
+    assert_eq!(report["groups"], tool(2, true, Some("3.D")));
+    assert_eq!(report["topology"], json!([1, 2, 3, 6, 7, 4, 5]));
+    let text = linesman(["online", &running.socket()]).stdout;
+    let said = "Hot connect group tool: joined at port 3.D; 2 of 2 SubDevices there.";
+    assert!(text.contains(said), "{text}");
+    let report = running.until("leaves", |report| report["groups"][0]["present"] == 0);
+    assert_eq!(report["groups"], tool(0, false, None));
+    let text = linesman(["online", &running.socket()]).stdout;
+    assert!(text.contains("Hot connect group tool: absent; 0 of 2 SubDevices there."), "{text}");
 }
 
 // proves: RED-08 (S)

@@ -1,7 +1,7 @@
 //! A report made of what is planned, what has happened and how it is now.
 
 use linesman_config::plan::{DevicePlan, Plan};
-use linesman_maindevice::watch::{CounterTotals, NetworkStatus, WatchedDevice};
+use linesman_maindevice::watch::{CounterTotals, GroupStatus, NetworkStatus, WatchedDevice};
 use linesman_maindevice::{FrameStatus, Statistics};
 use linesman_proto::address::{DeviceId, Position};
 use linesman_proto::port::Port;
@@ -13,8 +13,8 @@ use linesman_proto::topology::End;
 
 use super::report::{
     Count, FrameCounts, MailboxTrouble, Neighbour, OddFrames, OnlineChange, OnlineClock,
-    OnlineDevice, OnlineFrame, OnlineIdentity, OnlineMailbox, OnlinePort, OnlineReport,
-    OnlineSyncUnit, SCHEMA, Word,
+    OnlineDevice, OnlineFrame, OnlineGroup, OnlineIdentity, OnlineMailbox, OnlinePort,
+    OnlineReport, OnlineSyncUnit, SCHEMA, Word,
 };
 use super::snapshot::Snapshot;
 
@@ -84,7 +84,21 @@ pub(super) fn known(plan: &Plan, status: &NetworkStatus, now: Instant) -> Online
             .network_time()
             .map(|(id, ahead_ns)| OnlineClock { reference: id.no(), ahead_ns }),
         devices: devices.map(|(planned, watched)| device(plan, planned, watched)).collect(),
+        groups: status.groups().iter().map(|one| group(status, one)).collect(),
+        topology: status.topology_order().iter().map(|id| id.no()).collect(),
         ..OnlineReport::default()
+    }
+}
+
+fn group(status: &NetworkStatus, group: &GroupStatus) -> OnlineGroup {
+    let is_there =
+        |id: &&DeviceId| status.device(**id).is_some_and(|one| one.is_present() == Some(true));
+    OnlineGroup {
+        name: group.name().to_owned(),
+        devices: group.members().iter().map(|id| id.no()).collect(),
+        present: group.members().iter().filter(is_there).count() as u32,
+        joined: group.has_joined(),
+        place: group.place().map(|(id, port)| format!("{}.{port}", id.no())),
     }
 }
 

@@ -38,6 +38,12 @@ pub struct OnlineReport {
     pub clock: Option<OnlineClock>,
     /// The SubDevices, by number.
     pub devices: Vec<OnlineDevice>,
+    /// The hot connect groups, in the order of the plan.
+    #[serde(default)]
+    pub groups: Vec<OnlineGroup>,
+    /// Numbers of all SubDevices in the order of a topology list: those of groups come last.
+    #[serde(default)]
+    pub topology: Vec<u32>,
     /// The cyclic frames, task by task.
     pub frames: Vec<OnlineFrame>,
     /// The sync units, task by task.
@@ -53,6 +59,23 @@ pub struct OnlineReport {
     /// What goes through the virtual switch (EoE); `null`: no SubDevice has a port of it, and there is no interface.
     #[serde(default)]
     pub ethernet: Option<EthernetReport>,
+}
+
+/// A hot connect group.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct OnlineGroup {
+    /// Its name.
+    pub name: String,
+    /// Numbers of its SubDevices, that of the first one first.
+    pub devices: Vec<u32>,
+    /// How many of them are there.
+    pub present: u32,
+    /// Whether it is plugged in, and all of it have reached their states.
+    pub joined: bool,
+    /// The port that it hangs at, such as `3.D`: number and port; `null` while it is absent.
+    pub place: Option<String>,
 }
 
 /// The time of the network: that of the reference clock.

@@ -2,7 +2,7 @@
 
 use linesman_proto::state::NetworkState;
 use linesman_runtime::online::report::{
-    Count, FrameCounts, OnlineDevice, OnlinePort, OnlineReport,
+    Count, FrameCounts, OnlineDevice, OnlineGroup, OnlinePort, OnlineReport,
 };
 
 use crate::command::run::ethernet::summary;
@@ -26,6 +26,7 @@ pub(super) fn text(report: &OnlineReport, last: Option<&OnlineReport>, output: &
     );
     text.push_str(&devices(report, last, paint));
     text.push('\n');
+    text.push_str(&groups(report));
     text.push_str(&frames(report));
     if let Some(ethernet) = &report.ethernet {
         text.push_str(&summary(ethernet));
@@ -162,6 +163,23 @@ fn mailbox(device: &OnlineDevice) -> String {
         (errors, true) => format!("ok, {} before", count(errors, "error")),
         (errors, false) => format!("{} failed, {}", standing.join(" and "), count(errors, "error")),
     }
+}
+
+/// `Hot connect group tool: joined at port 3.D; 2 of 2 SubDevices there.`
+fn groups(report: &OnlineReport) -> String {
+    let line = |group: &OnlineGroup| {
+        let place = group.place.as_ref().map(|place| format!(" at port {place}"));
+        let state = match (group.joined, group.present) {
+            (true, _) => "joined",
+            (false, 0) => "absent",
+            (false, _) => "on its way",
+        };
+        let planned = count(group.devices.len() as u64, "SubDevice");
+        let (name, present) = (&group.name, group.present);
+        let place = place.unwrap_or_default();
+        format!("Hot connect group {name}: {state}{place}; {present} of {planned} there.\n")
+    };
+    report.groups.iter().map(line).collect()
 }
 
 /// `Ring: 0 SubDevices counted in what card A receives, 9 in that of card B: it is whole.`
