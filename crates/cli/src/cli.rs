@@ -3,8 +3,8 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    bundle, capture, completion, counters, demo, diagnose, explain, fault, foe, history, host,
-    interfaces, lab, log, online, plan, probe, reg, run, scan, schema, sdo, sii, sim, state,
+    bundle, capture, completion, counters, demo, diagnose, explain, fault, foe, history, host, id,
+    interfaces, lab, log, online, plan, probe, reg, ring, run, scan, schema, sdo, sii, sim, state,
 };
 use crate::version::VERSION;
 
@@ -73,12 +73,16 @@ pub(crate) enum Command {
     Foe(foe::Arguments),
     /// EEPROM of a SubDevice: read, write, compare, station alias
     Sii(sii::Arguments),
+    /// Numbers that tell equal SubDevices apart: read, compared with a project, set
+    Id(id::Arguments),
     /// Registers of a SubDevice's controller: read, write
     Reg(reg::Arguments),
     /// Error counters of all SubDevices: read, clear, watch and export them, judge what rises
     Counters(counters::Arguments),
     /// Try out each link with many long frames, while nobody drives the line
     Probe(probe::Arguments),
+    /// Set up a ring step by step: scan with it open, second card, end, check
+    Ring(ring::Arguments),
     /// Drive a line: bring it up, exchange process data, watch it, stop it cleanly
     Run(run::Arguments),
     /// A line as it is now: states, error counters, frames, mailboxes; once or live
@@ -116,6 +120,8 @@ impl Command {
             Self::Foe(arguments) => Some(&arguments.place.line),
             Self::Sii(arguments) => Some(&arguments.place.line),
             Self::Reg(arguments) => Some(&arguments.place.line),
+            Self::Id(arguments) => Some(&arguments.line),
+            Self::Ring(arguments) => Some(&arguments.place),
             Self::Demo(_)
             | Self::Capture(_)
             | Self::Bundle(_)
@@ -157,7 +163,9 @@ impl Command {
             Self::Counters(arguments) => arguments.json,
             Self::Probe(arguments) => arguments.json,
             Self::Explain(arguments) => arguments.json,
-            Self::Demo(_) | Self::Schema(_) | Self::Completion(_) => false,
+            Self::Demo(_) | Self::Id(_) | Self::Ring(_) | Self::Schema(_) | Self::Completion(_) => {
+                false
+            }
         }
     }
 }

@@ -12,6 +12,7 @@ pub(crate) mod fault;
 pub(crate) mod foe;
 pub(crate) mod history;
 pub(crate) mod host;
+pub(crate) mod id;
 pub(crate) mod interfaces;
 pub(crate) mod lab;
 pub(crate) mod line_access;
@@ -20,6 +21,7 @@ pub(crate) mod online;
 pub(crate) mod plan;
 pub(crate) mod probe;
 pub(crate) mod reg;
+pub(crate) mod ring;
 pub(crate) mod run;
 pub(crate) mod scan;
 pub(crate) mod schema;
@@ -60,6 +62,8 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Counters(arguments) => counters::run(&arguments, output),
         Command::Probe(arguments) => probe::run(&arguments, output),
         Command::Reg(arguments) => reg::run(&arguments, output),
+        Command::Id(arguments) => id::run(&arguments, output),
+        Command::Ring(arguments) => ring::run(&arguments, output),
         Command::Schema(arguments) => schema::run(&arguments, output),
         Command::Completion(arguments) => completion::run(&arguments, output),
     }

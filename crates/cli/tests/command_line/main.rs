@@ -67,6 +67,7 @@ mod reasons;
 mod recorded_run;
 mod replay;
 mod report_page;
+mod ring_set_up;
 mod run;
 mod running_segment;
 mod second_look;

@@ -268,7 +268,7 @@ fn tell_alias(session: &mut ServiceLine, id: DeviceId) -> Result<Report, Service
 }
 
 /// The alias is guarded by the checksum of the first words: both are written.
-fn set_alias(
+pub(crate) fn set_alias(
     session: &mut ServiceLine,
     id: DeviceId,
     alias: u16,

@@ -155,7 +155,7 @@ impl Report {
         self.different_words > 0
     }
 
-    pub(super) fn text(&self, label: &str, output: &Output) -> String {
+    pub(crate) fn text(&self, label: &str, output: &Output) -> String {
         let mut lines = vec![format!(
             "{label}: EEPROM of {}, {} {}",
             bytes_text(self.size),
