@@ -47,7 +47,7 @@ pub(crate) struct Arguments {
 }
 
 /// The numbers that a SubDevice tells.
-struct Told {
+struct ToldNumbers {
     id: DeviceId,
     label: String,
     /// How its selector is read; nothing where its description names none.
@@ -57,7 +57,7 @@ struct Told {
     serial: u32,
 }
 
-impl Told {
+impl ToldNumbers {
     /// The number that it tells in one way; 0 is none.
     fn by(&self, way: IdentificationWay) -> u32 {
         match way {
@@ -109,7 +109,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 }
 
 /// Reads the number of a SubDevice in each way.
-fn read(session: &mut ServiceLine, id: DeviceId) -> Result<Told, Failure> {
+fn read(session: &mut ServiceLine, id: DeviceId) -> Result<ToldNumbers, Failure> {
     let known = session.known(id);
     let serial =
         known.and_then(|known| known.identity).map_or(0, |identity| identity.serial_number);
@@ -124,7 +124,7 @@ fn read(session: &mut ServiceLine, id: DeviceId) -> Result<Told, Failure> {
         Identification::AlStatus => ask(session, id)?,
     };
     let alias = word(session.try_read(id, register::STATION_ALIAS.address, 2)?).unwrap_or(0);
-    Ok(Told { id, label: session.label(id), how, selector, alias, serial })
+    Ok(ToldNumbers { id, label: session.label(id), how, selector, alias, serial })
 }
 
 /// Asks for the number by bit 5 of AL control; it stands in 0x0134 while bit 5 of AL status is set (ETG.1020). The state stays
@@ -159,7 +159,7 @@ fn ask(session: &mut ServiceLine, id: DeviceId) -> Result<Option<u16>, Failure> 
     Ok(number.map(|(_, code)| code))
 }
 
-fn table(told: &[Told], output: &Output) -> String {
+fn table(told: &[ToldNumbers], output: &Output) -> String {
     let mut table =
         Table::new(&["no", "SubDevice", "selector", "read", "alias", "serial"], output.paint());
     for one in told {
@@ -182,11 +182,11 @@ fn table(told: &[Told], output: &Output) -> String {
 }
 
 /// The keys for a project that make these numbers compared, of those that have one; and numbers that several tell.
-fn propose(told: &[Told], output: &mut Output) {
+fn propose(told: &[ToldNumbers], output: &mut Output) {
     let ways = [(IdentificationWay::Selector, "selector"), (IdentificationWay::Alias, "alias")];
     let mut lines = Vec::new();
     for (way, word) in ways {
-        let mut tellers: BTreeMap<u32, Vec<&Told>> = BTreeMap::new();
+        let mut tellers: BTreeMap<u32, Vec<&ToldNumbers>> = BTreeMap::new();
         for one in told.iter().filter(|one| one.by(way) != 0) {
             tellers.entry(one.by(way)).or_default().push(one);
         }
@@ -216,7 +216,7 @@ fn propose(told: &[Told], output: &mut Output) {
 }
 
 /// What differs between the numbers of a project and those that are told.
-fn compare(project: &Project, told: &[Told], one: Option<DeviceId>) -> Vec<Failure> {
+fn compare(project: &Project, told: &[ToldNumbers], one: Option<DeviceId>) -> Vec<Failure> {
     let Ok(tree) = project.tree() else { return Vec::new() };
     let mut wrong = Vec::new();
     for (node, device) in project.devices.iter().enumerate() {
@@ -226,7 +226,8 @@ fn compare(project: &Project, told: &[Told], one: Option<DeviceId>) -> Vec<Failu
         if one.is_some_and(|one| place != Some(one)) {
             continue;
         }
-        let tellers: Vec<&Told> = told.iter().filter(|told| told.by(choice.by) == wanted).collect();
+        let tellers: Vec<&ToldNumbers> =
+            told.iter().filter(|told| told.by(choice.by) == wanted).collect();
         let here = told.iter().find(|told| Some(told.id) == place);
         wrong.extend(difference(project, device, choice, wanted, here, &tellers));
     }
@@ -239,8 +240,8 @@ fn difference(
     device: &ProjectDevice,
     choice: &IdentificationChoice,
     wanted: u32,
-    here: Option<&Told>,
-    tellers: &[&Told],
+    here: Option<&ToldNumbers>,
+    tellers: &[&ToldNumbers],
 ) -> Option<Failure> {
     let name = &device.name;
     let way = match choice.by {

@@ -58,14 +58,14 @@ pub(crate) struct Arguments {
 type RingEnd = (usize, Port);
 
 /// Where the ring is.
-enum Site {
+enum RingSite {
     /// Two cards.
     Cards([String; 2]),
     /// A virtual segment of a file, which begins anew with each scan; its cables are plugged by this program.
     Segment(PathBuf),
 }
 
-impl Site {
+impl RingSite {
     fn of(word: &str) -> Result<Self, Failure> {
         let selector: Selector = word.parse()?;
         match &selector {
@@ -167,9 +167,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     if let Some(path) = &arguments.save {
         files::refuse_to_overwrite(path)?;
     }
-    let site = Site::of(&arguments.place)?;
+    let site = RingSite::of(&arguments.place)?;
     let [first, second] = site.cards();
-    if let Site::Cards(names) = &site {
+    if let RingSite::Cards(names) = &site {
         line_access::refuse(names)?;
     }
     let patience = Duration::from_secs(arguments.wait);
@@ -233,8 +233,12 @@ fn is_closed(inventory: &Inventory) -> bool {
 }
 
 /// Waits until the cable of the second card is out.
-fn wait_until_open(site: &Site, patience: Duration, output: &mut Output) -> Result<(), Failure> {
-    let Site::Cards([_, second]) = site else { return Ok(()) };
+fn wait_until_open(
+    site: &RingSite,
+    patience: Duration,
+    output: &mut Output,
+) -> Result<(), Failure> {
+    let RingSite::Cards([_, second]) = site else { return Ok(()) };
     let until = Instant::now() + patience;
     let mut is_told = false;
     // Nobody, or another line, is no closed ring; the scan tells.
@@ -253,7 +257,7 @@ fn wait_until_open(site: &Site, patience: Duration, output: &mut Output) -> Resu
 
 /// Waits until the ring is closed; what is still wrong when the time is up.
 fn wait_until_closed(
-    site: &Site,
+    site: &RingSite,
     expected: usize,
     patience: Duration,
 ) -> Result<Inventory, Failure> {
@@ -271,7 +275,7 @@ fn wait_until_closed(
 }
 
 /// Why a ring of so many SubDevices is not closed.
-fn still_open(site: &Site, expected: usize, ring: &Inventory) -> Failure {
+fn still_open(site: &RingSite, expected: usize, ring: &Inventory) -> Failure {
     let [first, second] = site.cards();
     let answering = ring.devices.len();
     if answering > expected {
@@ -316,7 +320,7 @@ fn still_open(site: &Site, expected: usize, ring: &Inventory) -> Failure {
 }
 
 /// A line that is entered by a port for what follows.
-fn refuse_reversed(line: &Inventory, site: &Site) -> Result<(), Failure> {
+fn refuse_reversed(line: &Inventory, site: &RingSite) -> Result<(), Failure> {
     let tree = line.tree();
     let Some(node) = tree.first(CardPath::A).filter(|node| tree.is_reversed(*node)) else {
         return Ok(());
