@@ -22,8 +22,8 @@ pub mod ethernet;
 mod from_esi;
 mod group;
 mod resolve;
-mod time;
 mod ring;
+mod time;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -47,8 +47,8 @@ pub use device::ProjectDevice;
 pub use ethernet::EthernetChoice;
 pub use group::{IdentificationChoice, IdentificationWay, ProjectGroup};
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
-pub use time::{SyncLeader, TimeChoice, TimeStampForm};
 pub use ring::Ring;
+pub use time::{SyncLeader, TimeChoice, TimeStampForm};
 
 /// A project.
 #[derive(Clone, PartialEq, Eq, Debug, Deserialize)]

@@ -117,10 +117,9 @@ fn serve(bench: &mut Bench, id: DeviceId, service: Service) -> ServiceAnswer {
 
 fn alias_in_use(bench: &mut Bench, id: DeviceId) -> Vec<u8> {
     let read = Service::ReadRegister { address: STATION_ALIAS.address, len: 2 };
-    match serve(bench, id, read) {
-        ServiceAnswer::Data(bytes) => bytes,
-        other => panic!("{other:?}"),
-    }
+    let answer = serve(bench, id, read);
+    let ServiceAnswer::Data(bytes) = answer else { panic!("{answer:?}") };
+    bytes
 }
 
 /// Two equal terminals, told apart by the alias that the MainDevice has written into one of them.

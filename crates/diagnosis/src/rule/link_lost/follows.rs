@@ -11,7 +11,7 @@ use linesman_proto::topology::{End, Tree};
 use super::ends;
 use crate::finding::Symptom;
 use crate::locate::LinkLosses;
-use crate::model::{Rise, NetworkModel};
+use crate::model::{NetworkModel, Rise};
 
 /// No link of a device that starts anew comes up so much later than the others.
 const SLOWEST_LINK_UP: Span = Span::s(5);
@@ -84,6 +84,7 @@ fn kept_power(model: &NetworkModel, tree: &Tree, own: &LinkLosses) -> bool {
     let device = &model.devices[node];
     let lost = device.counters.track(ErrorCounter::LostLink(entry));
     let since = |rise: &&Rise| rise.at >= own.first;
-    let counted = lost.map(|track| track.rises.iter().filter(since).map(|rise| rise.difference.rise));
+    let counted =
+        lost.map(|track| track.rises.iter().filter(since).map(|rise| rise.difference.rise));
     !device.has_restarted() && counted.is_some_and(|rises| rises.sum::<u64>() >= own.count)
 }
