@@ -6,10 +6,11 @@
 use linesman_proto::address::DeviceId;
 
 use super::{Doubt, Severity};
-use crate::plan::{DevicePlan, Plan};
+use crate::plan::Plan;
+use crate::plan::time_source::PORT_MULTIPLIER;
 
-/// Vendor and product code of the port multiplier CU2508.
-const MULTIPLIER: (u32, u32) = (2, 0x09CC_5432);
+/// Vendor of the port multiplier.
+const BECKHOFF: u32 = 2;
 
 impl Plan {
     /// Whether clocks in the ring have what the project, or another MainDevice, asks for.
@@ -29,27 +30,13 @@ impl Plan {
             });
         }
         let Some(reference) = self.reference_clock() else { return };
-        let is_multiplier = |device: &&DevicePlan| {
-            (device.identity.vendor_id, device.identity.product_code) == MULTIPLIER
-        };
-        let multiplier = self.devices.iter().find(is_multiplier).map(|device| device.id);
-        let has_one = self.ring_clocks.port_multiplier.is_some() || multiplier.is_some();
-        if !has_one {
+        // One that is there is the reference clock: a project is refused else (DC-13).
+        let (_, product) = PORT_MULTIPLIER;
+        let is_there = self.devices.iter().any(|device| {
+            (device.identity.vendor_id, device.identity.product_code) == (BECKHOFF, product)
+        });
+        if self.ring_clocks.port_multiplier.is_none() && !is_there {
             doubts.push(self.without_multiplier(reference));
-        } else if let Some(multiplier) = multiplier.filter(|id| *id != reference) {
-            doubts.push(Doubt {
-                severity: Severity::Error,
-                name: "ring-clocks",
-                device: Some(multiplier),
-                text: format!(
-                    "{} is the reference clock of a ring behind the port multiplier {}",
-                    self.name(reference),
-                    self.name(multiplier)
-                ),
-                advice:
-                    "make the port multiplier the reference clock (`clock = { reference = true }`)"
-                        .to_owned(),
-            });
         }
     }
 
