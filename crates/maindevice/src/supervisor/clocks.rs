@@ -124,6 +124,12 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     }
     drop(alone);
     let Latch { at, clocks } = latched?;
+    for clock in clocks.iter().filter(|clock| !clock.has_clock) {
+        let planned = context.plan.devices.iter().find(|device| device.station == clock.station);
+        if let Some(device) = planned {
+            lock(&context.device_table).note_lacks_clock(device.id);
+        }
+    }
     let epoch = context.epoch();
     let reference = choose(&context.plan, &clocks)?;
     let found = |clock: &&SeenClock| clock.station == reference;
@@ -183,11 +189,15 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
             lock(&context.device_table).set_clock(id, is_wide);
         }
     }
-    // The cycle follows from now on.
+    // The cycle follows from now on. It begins anew with the reference alone: who else comes back follows that.
     let planned = context.plan.devices.iter().find(|device| device.station == reference);
+    let id = planned.map(|device| device.id);
     let mut device_table = lock(&context.device_table);
-    device_table.set_reference_clock(reference, planned.map(|device| device.id));
-    device_table.set_clock_epoch(epoch);
+    let is_new = device_table.reference_clock() != Some(reference);
+    device_table.set_reference_clock(reference, id);
+    if is_new || one.is_none() || one == id {
+        device_table.set_clock_epoch(epoch);
+    }
     drop(device_table);
     Ok(reference)
 }
@@ -256,7 +266,11 @@ async fn open_ring(context: &Context) -> Result<Option<(Target, DlControl)>, Clo
 
 /// Sets the clock of one SubDevice that came back without it.
 pub(super) async fn set_one(context: &Context, id: DeviceId) {
-    if !wanted(&context.plan) || lock(&context.device_table).has_clock_set(id) {
+    let is_done = {
+        let device_table = lock(&context.device_table);
+        device_table.has_clock_set(id) || device_table.lacks_clock(id)
+    };
+    if is_done || !wanted(&context.plan) {
         return;
     }
     let outcome = set(context, Some(id)).await;

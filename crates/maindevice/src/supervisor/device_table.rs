@@ -52,6 +52,8 @@ struct DeviceEntry {
     clock_set: bool,
     /// That clock has 64 bits.
     clock_wide: bool,
+    /// It was seen to have no clock.
+    lacks_clock: bool,
     /// That is the one of BOOT, for files only.
     boots: bool,
     /// How far it is to be driven; what the plan says unless asked for otherwise.

@@ -42,6 +42,18 @@ impl DeviceTable {
         self.devices.get(id.index()).is_some_and(|live| live.clock_set)
     }
 
+    /// A SubDevice was seen to have no clock.
+    pub(crate) fn note_lacks_clock(&mut self, id: DeviceId) {
+        if let Some(live) = self.live(id) {
+            live.lacks_clock = true;
+        }
+    }
+
+    /// True if a SubDevice was seen to have no clock.
+    pub(crate) fn lacks_clock(&self, id: DeviceId) -> bool {
+        self.devices.get(id.index()).is_some_and(|live| live.lacks_clock)
+    }
+
     /// Clocks were set to a time that was `epoch` when the run began.
     pub(crate) fn set_clock_epoch(&mut self, epoch: DcTime) {
         let times = self.clock_base.map_or(0, |(times, _)| times);
