@@ -94,10 +94,10 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             // What was never there is a matter of the device rather than of the link.
             lead_with_device(&mut condition);
         }
-        if let Some(node) = dead_on_ring(view.model, tree, &all, drops) {
-            blame(view.model, tree, node, &mut condition);
-        } else if let Some(with) = share_supply(tree, &all, drops) {
+        if let Some(with) = share_supply(view.model, tree, &all, drops) {
             blame_supply(view.model, tree, drops, &with, &mut condition);
+        } else if let Some(node) = dead_on_ring(view.model, tree, &all, drops) {
+            blame(view.model, tree, node, &mut condition);
         }
         conditions.push(condition);
     }
@@ -158,58 +158,75 @@ fn blame(model: &NetworkModel, tree: &Tree, node: usize, condition: &mut Conditi
     }
 }
 
-/// Links, side by side, that were lost at the same moment as this one, this one included, and are down since: two cables
-/// do not break at one moment, but what hangs on them may have one supply.
+/// Links, side by side, that were lost at the same moment as this one, this one included, and are down since, with the
+/// device that went with each: two cables do not break at one moment, but what hangs on them may have one supply.
 fn share_supply<'a>(
+    model: &NetworkModel,
     tree: &Tree,
     all: &'a [LinkLosses],
     drops: &'a LinkLosses,
-) -> Option<Vec<&'a LinkLosses>> {
-    // What is behind another lost link went with it.
-    let is_one = |one: &&LinkLosses| {
-        let way = |node: usize| tree.path_to(node).into_iter().filter(move |on| *on != node);
-        let lost_above = |node: usize| {
-            way(node)
-                .filter_map(|on| tree.link_above(on))
-                .any(|link| all.iter().any(|other| other.link == link && other.is_down))
-        };
-        let behind = tree.links()[one.link].downstream.node();
-        one.is_down
-            && one.count == 1
-            && !tree.is_on_ring(one.link)
-            && one.falls_with(drops)
-            && behind.is_some_and(|node| !lost_above(node))
+) -> Option<Vec<(&'a LinkLosses, usize)>> {
+    // What is behind another lost link went with it, but in a ring there is another way.
+    let lost_above = |node: usize| {
+        let way = tree.path_to(node).into_iter().filter(move |on| *on != node);
+        way.filter_map(|on| tree.link_above(on)).any(|link| {
+            !tree.is_on_ring(link) && all.iter().any(|other| other.link == link && other.is_down)
+        })
     };
-    let with: Vec<&LinkLosses> = all.iter().filter(is_one).collect();
-    let is_among = with.iter().any(|one| one.link == drops.link);
-    (is_among && with.len() > 1).then_some(with)
+    let gone = |one: &LinkLosses| {
+        if tree.is_on_ring(one.link) {
+            return dead_on_ring(model, tree, all, one);
+        }
+        tree.links()[one.link].downstream.node().filter(|node| !lost_above(*node))
+    };
+    let is_one = |one: &&LinkLosses| one.is_down && one.count == 1 && one.falls_with(drops);
+    let with: Vec<_> =
+        all.iter().filter(is_one).filter_map(|one| Some((one, gone(one)?))).collect();
+    let own = with.iter().find(|(one, _)| one.link == drops.link)?.1;
+    // Behind a device of a ring that went nobody is reached either.
+    let is_behind = |node: usize| {
+        with.iter().any(|(_, other)| {
+            *other != node
+                && tree.subtree(*other).contains(&node)
+                && !tree.ring_nodes().contains(&node)
+        })
+    };
+    let with: Vec<_> =
+        with.iter().copied().filter(|(_, node)| *node == own || !is_behind(*node)).collect();
+    let is_several = with.iter().any(|(_, node)| *node != own);
+    is_several.then_some(with)
 }
 
-/// Lays a lost link to the supply of the device behind it; those that fell with it follow from the first.
+/// Lays a lost link to the supply of the device that went with it; those that fell with it follow from the first.
 fn blame_supply(
     model: &NetworkModel,
     tree: &Tree,
     drops: &LinkLosses,
-    with: &[&LinkLosses],
+    with: &[(&LinkLosses, usize)],
     condition: &mut Condition,
 ) {
-    let Some(node) = tree.links()[drops.link].downstream.node() else { return };
+    let Some(node) = with.iter().find(|(one, _)| one.link == drops.link).map(|(_, node)| *node)
+    else {
+        return;
+    };
     let link = condition.place;
+    if tree.is_on_ring(drops.link) {
+        blame(model, tree, node, condition);
+    }
     let place = Place::device(model.network, DeviceId(node as u32));
     condition.place = place;
     (condition.cause, condition.confidence) = (FaultName::SupplyOff, 0.6);
     let other = |cause, place, confidence| Alternative { cause, place, confidence };
     condition.alternatives =
         vec![other(FaultName::LinkOpen, Some(link), 0.15), other(FaultName::DeviceOff, None, 0.15)];
-    if with.first().is_some_and(|first| first.link == drops.link) {
-        let follows = with.iter().flat_map(|one| follows(model, tree, one.link));
+    if with.first().is_some_and(|(first, _)| first.link == drops.link) {
+        let follows = with.iter().flat_map(|(one, _)| follows(model, tree, one.link));
         condition.explains.extend(follows);
     }
-    let names: Vec<String> = with
-        .iter()
-        .filter_map(|one| tree.links()[one.link].downstream.node())
-        .map(|node| model.label(DeviceId(node as u32)))
-        .collect();
+    let mut gone: Vec<usize> = with.iter().map(|(_, node)| *node).collect();
+    gone.dedup();
+    let names: Vec<String> =
+        gone.into_iter().map(|node| model.label(DeviceId(node as u32))).collect();
     condition.actions.insert(
         0,
         format!(

@@ -38,8 +38,8 @@ fn feeder(model: &NetworkModel, tree: &Tree, node: usize) -> Option<usize> {
 fn has_gone(model: &NetworkModel, node: usize, together: &[Fall<'_>]) -> bool {
     let device = &model.devices[node];
     let latest = together.iter().map(|fall| fall.change.at).max();
-    let has_kept =
-        !device.has_restarted() && device.al.status.is_some_and(|status| Some(status.at) >= latest);
+    let has_kept = !device.has_restarted()
+        && device.answered.is_some_and(|answered| Some(answered.at) > latest);
     if has_kept {
         return false;
     }
