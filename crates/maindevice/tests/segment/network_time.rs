@@ -225,7 +225,7 @@ fn clock_terminal_sets_the_mode_its_speed_is_taken_over_and_its_offset_told_and_
     assert!(off.abs() < 2_000, "{off} ns");
 }
 
-// proves: DC-12
+// proves: DC-12 partial: networks that a program puts into one group; those of `linesman run` are in none
 #[test]
 fn of_two_networks_of_a_process_the_first_leads_and_the_other_follows_without_a_setting() {
     let group = NetworkGroup::new();
@@ -323,7 +323,8 @@ fn by_itself(project: &mut Project) {
     project.devices[2].time_stamps = Some(TimeStampForm::Bits64);
 }
 
-// proves: DC-15, DC-17
+// proves: DC-15 partial: what either side measures of the other is set by the test
+// proves: DC-17 partial: what either side measures of the other is set by the test
 #[test]
 fn bridge_keeps_two_networks_in_step_in_the_direction_that_both_maindevices_set() {
     type Choice = fn(&mut Project);
