@@ -98,8 +98,8 @@ impl Suspicion {
                 other.hop.link == damage.hop.link && other.hop.direction != damage.hop.direction
             });
             match damage.hop.from {
-                // Noise hits symbols: many bad frames without any are not its doing, whatever the way back shows.
-                // One device that spoils frames inside does so at each of its outputs.
+                // One device that spoils frames inside does so at each of its outputs. Noise hits symbols: many bad
+                // frames without any are not its doing, whatever the way back shows.
                 End::Controller(node, _)
                     if is_clean(damage) && (!both || damage.frames >= MANY) =>
                 {

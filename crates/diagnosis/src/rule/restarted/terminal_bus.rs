@@ -34,7 +34,7 @@ fn feeder(model: &NetworkModel, tree: &Tree, node: usize) -> Option<usize> {
 }
 
 /// True if it fell with them, or was away meanwhile: its state may not have been read before it went again. Who was cut
-/// off behind one that fell, and came back with its station address and a state above INIT, had its supply.
+/// off behind one that fell, has not started anew and answers since the last fall, had its supply.
 fn has_gone(model: &NetworkModel, node: usize, together: &[Fall<'_>]) -> bool {
     let device = &model.devices[node];
     let latest = together.iter().map(|fall| fall.change.at).max();
