@@ -5,6 +5,7 @@
 //! its start to its end. What it holds when it ends (open contacts, supplies that are off, waiting
 //! hits) is let go. No kind knows anything of counters.
 
+mod carrier;
 mod error;
 mod manual;
 mod parameter;
@@ -57,6 +58,7 @@ mod watchdog_starved;
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
+pub use carrier::Carrier;
 pub use error::FaultError;
 pub use manual::manual;
 pub use parameter::{Parameter, Shape};
