@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::parts::span_ns;
 use super::perturb::Perturbation;
+use super::plant_extras::add_supplies;
 use crate::choice::AT_RUN_TIME;
 use crate::habit::Habit;
 
@@ -30,6 +31,8 @@ pub struct ScoreOptions {
     /// How the MainDevice drives the line. With another habit than ours nobody asks for registers, and listeners are
     /// judged.
     pub habit: Habit,
+    /// True if the parts that are blamed are exchanged one after the other, with a look again after each.
+    pub tries_repairs: bool,
     /// Whether what listeners heard is kept.
     pub keeps_heard: bool,
     /// True if plants and diagnoses are kept.
@@ -114,6 +117,7 @@ impl Case {
         file.counts_forwarded = (!forwarded).then_some(false);
         file.noise_at_link_up = stream.chance(0.2).then_some(3.0);
         link_times(&mut file, &mut seed.stream("score link-up"));
+        add_supplies(&mut file, &mut seed.stream("score supplies"));
         let mut extra = seed.stream("score beside");
         let is_masked =
             kind == CaseKind::Masked || extra.chance(if options.healthy { 0.5 } else { 0.25 });

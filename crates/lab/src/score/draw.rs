@@ -288,33 +288,48 @@ impl Drawer<'_, '_> {
     }
 
     fn unpowered(&mut self) -> Option<Drawn> {
-        let (device, id) = self.any_device()?;
-        let mut names = vec![device.name.clone()];
-        if self.name == SupplyOff {
-            for _ in 0..=self.stream.below(3) {
-                let (other, _) = self.any_device()?;
-                if !names.contains(&other.name) {
-                    names.push(other.name.clone());
-                }
-            }
-            // A supply of one device alone is that device's power.
-            if names.len() < 2 {
-                return None;
-            }
-        }
-        let mut entry = self.entry();
-        match names.as_slice() {
-            [one] => entry.device = Some(one.clone()),
-            _ => entry.devices = Some(names),
-        }
+        let (entry, id) =
+            if self.name == DeviceOff { self.one_supplied()? } else { self.supplied()? };
         let drawn = if self.name == BrownOut {
-            entry = entry.with("dip_ms", self.number(0.5, DIP_MS));
+            let entry = entry.with("dip_ms", self.number(0.5, DIP_MS));
             self.lasting(entry, 3_000.0, 4_000.0)
         } else {
             let hard = self.hard(entry.clone());
             Drawn { ends: hard.ends, ..self.lasting(entry, DIP_MS, OFF_MS) }
         };
         Some(Self::at_device(drawn, id))
+    }
+
+    fn one_supplied(&mut self) -> Option<(FaultEntry, DeviceId)> {
+        let (device, id) = self.any_device()?;
+        Some((self.entry().device(device.name), id))
+    }
+
+    /// What hangs on a supply: on one of the plant's in half of the cases where it has any, else some devices, or, for a
+    /// dip, one.
+    fn supplied(&mut self) -> Option<(FaultEntry, DeviceId)> {
+        if !self.offer.file.supplies.is_empty()
+            && self.stream.chance(0.5)
+            && let Some(supply) = self.stream.pick(&self.offer.file.supplies).cloned()
+        {
+            let first = supply.devices.first()?;
+            let at = self.offer.outline.names.iter().position(|name| name == first)?;
+            let entry = FaultEntry { supply: Some(supply.name), ..self.entry() };
+            return Some((entry, DeviceId(at as u32)));
+        }
+        if self.name == BrownOut {
+            return self.one_supplied();
+        }
+        let (device, id) = self.any_device()?;
+        let mut names = vec![device.name];
+        for _ in 0..=self.stream.below(3) {
+            let (other, _) = self.any_device()?;
+            if !names.contains(&other.name) {
+                names.push(other.name);
+            }
+        }
+        // A supply of one device alone is that device's power.
+        (names.len() >= 2).then(|| (FaultEntry { devices: Some(names), ..self.entry() }, id))
     }
 
     fn overload(&mut self) -> Option<Drawn> {

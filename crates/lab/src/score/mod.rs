@@ -2,7 +2,7 @@
 //!
 //! A seed gives a [`case`]: a plant, its features, and faults of the whole catalogue with wide
 //! parameters ([`draw`]). [`play`] runs it, live and as a recording, [`judge`] holds what was said
-//! against the truth log, [`report`] adds up. [`disturb`] does to a healthy line what is no fault,
+//! against the truth log, [`repair_trial`] exchanges what was blamed, [`report`] adds up. [`disturb`] does to a healthy line what is no fault,
 //! [`perturb`] makes a plant other than the diagnosis expects, [`listen`] judges by what is heard beside a MainDevice
 //! with other habits. A case counts when the truth log shows an effect,
 //! whether or not the diagnosis saw it.
@@ -17,11 +17,14 @@ mod effect;
 pub mod excerpt;
 pub mod judge;
 pub mod listen;
+pub mod outcome;
 pub mod parts;
 pub mod perturb;
+mod plant_extras;
 pub mod play;
 pub mod rate;
 mod recorder;
+pub mod repair_trial;
 pub mod report;
 mod sharing;
 pub mod tally;
@@ -29,8 +32,9 @@ mod trace;
 mod unplayable;
 
 pub use case::{CaseKind, ScoreOptions};
+pub use outcome::{CaseReport, FaultOutcome};
 pub use perturb::Perturbation;
-pub use play::{CaseReport, FaultOutcome, run_case};
+pub use play::run_case;
 pub use rate::Rate;
 pub use recorder::RecordedFrame;
 pub use report::ScoreReport;

@@ -1,7 +1,7 @@
 //! Parts of a score: cases that several processes or machines have played, to be added up as if one had.
 
 use super::case::ScoreOptions;
-use super::play::CaseReport;
+use super::outcome::CaseReport;
 use super::tally::Tally;
 use crate::part::{PartError, SeedPart};
 

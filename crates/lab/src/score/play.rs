@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::fault::FaultName;
 use linesman_config::project::Project;
+use linesman_diagnosis::model::reported::PartExchange;
 use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_diagnosis::report::Diagnosis;
 use linesman_diagnosis::{Engine, Setup};
@@ -11,20 +12,20 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Stream;
-use linesman_sim::segment_file::{FaultEntry, SegmentFile, Value};
+use linesman_sim::segment_file::{FaultEntry, Value};
 use linesman_sim::truth::{FaultId, TruthLog};
-use serde::{Deserialize, Serialize};
 
 use super::baseline::{self, CourseMethod};
 use super::built_in::{EarlyEnd, around_extra, with_built_in};
-use super::case::{Case, CaseKind, FaultPair, ScoreOptions};
+use super::case::{Case, CaseKind, ScoreOptions};
 use super::disturb::disturb;
 use super::draw::{Drawn, Ends, Offer, When, draw};
 use super::effect::{effects, is_bearable, is_harmless};
 use super::judge::{Accusations, Candidates, Judged, claim, judge};
-use super::listen::{HealthyListened, Heard, Listeners};
-use super::parts::span_ns;
+use super::outcome::{CaseReport, FaultOutcome};
+use super::plant_extras::add_group;
 use super::recorder::{SharedRecording, take_down, take_down_host};
+use super::repair_trial::{RepairTrial, try_repairs};
 use super::unplayable::Unplayable;
 use crate::choice::{LineOutline, are_apart, is_behind, text};
 use crate::habit::Habit;
@@ -50,87 +51,6 @@ const LISTENED: Span = Span::ms(2_500);
 const BETWEEN_PAUSES_MS: (f64, f64) = (300.0, 1_500.0);
 /// How often plants are drawn for a fault that needs a place of its own.
 const ATTEMPTS: u32 = 40;
-
-/// What came of one seed.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct CaseReport {
-    /// The seed.
-    pub seed: u64,
-    /// Its kind.
-    pub kind: CaseKind,
-    /// SubDevices.
-    pub devices: usize,
-    /// Whether it is a ring.
-    pub is_ring: bool,
-    /// Whether forwarded errors are counted, as far as types do.
-    pub forwarded: bool,
-    /// Whether the card's counters were known.
-    pub host_counters: bool,
-    /// Findings while nothing was wrong, live and in the recording; `None` where the line never was healthy.
-    pub healthy: Option<[Accusations; 2]>,
-    /// Time in which nothing was wrong, from the start on.
-    #[serde(with = "span_ns")]
-    pub healthy_for: Span,
-    /// What listeners said of it, beside a MainDevice with the habits of others.
-    pub healthy_listened: Option<HealthyListened>,
-    /// What listeners heard, where that is kept.
-    #[serde(skip)]
-    pub heard: Vec<Heard>,
-    /// Diagnoses at the end, live and of the recording, where they are kept.
-    #[serde(skip)]
-    pub reports: Option<Box<[Diagnosis; 2]>>,
-    /// The plant, where that is kept.
-    #[serde(skip)]
-    pub plant: Option<Box<SegmentFile>>,
-    /// The project of the line as TOML, where that is kept.
-    pub project: Option<String>,
-    /// Cycle of the process data.
-    #[serde(with = "span_ns")]
-    pub cycle: Span,
-    /// Faults that were drawn for it.
-    pub drawn: Vec<FaultName>,
-    /// Relation of two faults.
-    pub pair: FaultPair,
-    /// Its faults.
-    pub faults: Vec<FaultOutcome>,
-    /// True if another cable had rare errors beside its fault.
-    pub has_background: bool,
-    /// Why it could not be played.
-    pub unplayable: Option<Unplayable>,
-}
-
-/// What came of one fault.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FaultOutcome {
-    /// What it was.
-    pub name: FaultName,
-    /// With place and parameters.
-    pub entry: String,
-    /// How many effects the truth log has; without any the case does not count.
-    pub effects: u64,
-    /// The live diagnosis; `None` when only the recording is judged.
-    pub live: Option<Judged>,
-    /// The diagnosis of the recording.
-    pub capture: Judged,
-    /// True if the method of a course finds the place.
-    pub baseline: bool,
-    /// True if it did so little that a note is the right answer: one frame at most was lost or late, and no link.
-    pub is_bearable: bool,
-    /// True if nothing that anybody could see tells it from a line as planned.
-    pub is_unseen: bool,
-    /// Whether it is the MainDevice that stops.
-    pub is_pause: bool,
-    /// What listeners said of it, beside a MainDevice with the habits of others.
-    pub listened: Option<Listeners>,
-}
-
-impl CaseReport {
-    /// The command that plays it again.
-    #[must_use]
-    pub fn replay(&self) -> String {
-        format!("linesman lab score --seeds {}..{} --list", self.seed, self.seed + 1)
-    }
-}
 
 /// Plays the case of a seed.
 #[must_use]
@@ -189,6 +109,7 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
         drawn: case.faults.clone(),
         pair: case.pair,
         has_background: case.background.is_some(),
+        has_group: false,
         faults: Vec::new(),
         unplayable: None,
     }
@@ -231,8 +152,21 @@ pub(super) struct Play<'a> {
 
 impl<'a> Play<'a> {
     pub(super) fn new(case: &'a Case, options: &'a ScoreOptions) -> Result<Self, EarlyEnd> {
+        Self::told(case, options, Vec::new())
+    }
+
+    /// The same, with parts that were exchanged before.
+    pub(super) fn told(
+        case: &'a Case,
+        options: &'a ScoreOptions,
+        exchanges: Vec<PartExchange>,
+    ) -> Result<Self, EarlyEnd> {
         let mut stream = case.seed.stream("score faults");
-        let (file, built_in) = with_built_in(case, &mut stream)?;
+        let (mut file, built_in) = with_built_in(case, &mut stream)?;
+        let mut project = file.project().map_err(|_| EarlyEnd::NoPlace)?;
+        if built_in.is_empty() {
+            add_group(&mut file, &mut project, &mut case.seed.stream("score group"));
+        }
         let lab_options = LabOptions {
             habit: options.habit,
             cycle: case.cycle,
@@ -240,10 +174,12 @@ impl<'a> Play<'a> {
             clocks: case.clocks,
             probes: options.judges_live(),
             active: options.judges_live(),
+            exchanges,
             ..LabOptions::default()
         };
         // What cannot be built so is no case.
-        let mut lab = Lab::new(&file, lab_options).map_err(|_| EarlyEnd::NoPlace)?;
+        let lab = Lab::with_project(&file, project, lab_options);
+        let mut lab = lab.map_err(|_| EarlyEnd::NoPlace)?;
         let has_project = !built_in.is_empty();
         let setup = Setup {
             project: has_project.then(|| lab.project().clone()),
@@ -300,6 +236,7 @@ impl<'a> Play<'a> {
 
     fn run_all(&mut self) -> Result<CaseReport, EarlyEnd> {
         let mut report = empty(self.case, self.lab.tree().len());
+        report.has_group = !self.lab.project().groups.is_empty();
         report.project = self.options.keeps_heard.then(|| self.lab.project().to_toml());
         let mut active: Vec<Active> = Vec::new();
         if self.built_in.is_empty() {
@@ -349,11 +286,35 @@ impl<'a> Play<'a> {
             let pair = [(one, first), (other, second)];
             self.each_its_own(pair, &diagnosis, &recorded);
         }
+        if let ([one], [fault]) = (active.as_slice(), report.faults.as_mut_slice())
+            && self.options.tries_repairs
+        {
+            fault.repair = self.trial(one, fault, &diagnosis);
+        }
         self.keep_reports(&mut report, diagnosis, recorded);
         if let (true, Some(first)) = (self.options.keeps_heard, active.first()) {
             report.heard = self.heard(self.lab.truth().fault(first.id));
         }
         Ok(report)
+    }
+
+    /// What exchanges do to a fault that had an effect, and of which more than nothing was said.
+    fn trial(
+        &self,
+        active: &Active,
+        fault: &FaultOutcome,
+        diagnosis: &Diagnosis,
+    ) -> Option<RepairTrial> {
+        let live = fault.live.as_ref().filter(|_| fault.effects > 0 && !fault.is_unseen)?;
+        let truth = self.truth(active)?;
+        let first_look = (diagnosis, live.finding.as_str());
+        Some(try_repairs(self.case, self.options, &truth, self.lab.tree(), first_look))
+    }
+
+    /// The live diagnosis at the end.
+    pub(super) fn live_diagnosis(&mut self) -> Result<Diagnosis, EarlyEnd> {
+        self.run_all()?;
+        Ok(self.lab.diagnosis())
     }
 
     fn keep_reports(&self, report: &mut CaseReport, live: Diagnosis, recorded: Diagnosis) {
@@ -669,6 +630,7 @@ impl<'a> Play<'a> {
             is_unseen: truth.unseen.is_some(),
             is_pause,
             listened,
+            repair: None,
         })
     }
 }

@@ -66,6 +66,8 @@ pub struct ScoreReport {
     pub rings: GroupReport,
     /// Single faults beside rare errors of another cable.
     pub beside_background: GroupReport,
+    /// Single faults in plants with a hot connect group.
+    pub with_hot_connect: GroupReport,
     /// Faults that are in none of the figures, by name.
     pub left_out: BTreeMap<String, LeftOut>,
     /// Runs in which nothing was wrong.
@@ -109,6 +111,20 @@ pub struct GroupReport {
     pub capture: SideReport,
     /// The method of a course.
     pub baseline: Rate,
+    /// Exchanges that were tried on account of the live diagnosis; `null` when none were.
+    pub repairs_tried: Option<RepairReport>,
+}
+
+/// Faults that were mended by exchanges of what the diagnosis blamed, with a look again after each that was in vain.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RepairReport {
+    /// By the first exchange.
+    pub mended_by_first: Rate,
+    /// By one of the first two.
+    pub by_second: Rate,
+    /// By one of the first three.
+    pub by_third: Rate,
 }
 
 /// How the diagnosis did.
@@ -123,7 +139,7 @@ pub struct SideReport {
     pub place_at_1_set: Rate,
     /// Cause and place are right or admitted.
     pub cause_at_1_set: Rate,
-    /// The exchange of the part that the first finding blames mends it.
+    /// The part that the first finding blames is the one that carries it.
     pub repair_at_1: Rate,
     /// Faults that did harm, of which a note was all that was said: they count as not found.
     pub notes_instead: u64,

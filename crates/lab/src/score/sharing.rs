@@ -3,7 +3,8 @@
 use linesman_diagnosis::report::Diagnosis;
 
 use super::judge::Judged;
-use super::play::{Active, FaultOutcome, First, Play};
+use super::outcome::FaultOutcome;
+use super::play::{Active, First, Play};
 
 impl Play<'_> {
     /// Each of two faults needs a finding of its own: where one finding fits both, the fault that has another one

@@ -8,11 +8,12 @@ use linesman_proto::time::Span;
 use super::case::{CaseKind, ScoreOptions};
 use super::judge::Judged;
 use super::listen::tally::ListenTally;
-use super::play::{CaseReport, FaultOutcome};
+use super::outcome::{CaseReport, FaultOutcome};
 use super::rate::{Count, rounded};
+use super::repair_trial::MOST_EXCHANGES;
 use super::report::{
-    Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, LeftOut, PairRates, SCHEMA,
-    ScoreReport, SideReport, WrongReport,
+    Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, LeftOut, PairRates,
+    RepairReport, SCHEMA, ScoreReport, SideReport, WrongReport,
 };
 use super::unplayable::Unplayable;
 use crate::habit::Habit;
@@ -93,11 +94,19 @@ struct Group {
     live: Side,
     capture: Side,
     baseline: Count,
+    /// By number of exchanges, of repairs that were tried.
+    mended: [Count; MOST_EXCHANGES as usize],
 }
 
 impl Group {
     fn add(&mut self, fault: &FaultOutcome) {
         self.faults += 1;
+        if let (Some(trial), Some(live)) = (fault.repair, &fault.live) {
+            let mended_by = trial.mended_by.filter(|_| is_answer(fault, live));
+            for (number, count) in (1..).zip(&mut self.mended) {
+                count.add(mended_by.is_some_and(|by| by <= number));
+            }
+        }
         if let Some(live) = &fault.live {
             self.live.add(fault, live);
         }
@@ -106,7 +115,13 @@ impl Group {
     }
 
     fn report(&self) -> GroupReport {
+        let [mended_by_first, by_second, by_third] = self.mended.map(|count| count.rate());
         GroupReport {
+            repairs_tried: (mended_by_first.of > 0).then_some(RepairReport {
+                mended_by_first,
+                by_second,
+                by_third,
+            }),
             faults: self.faults,
             live: (self.live.place.rate().of > 0).then(|| self.live.report()),
             capture: self.capture.report(),
@@ -177,6 +192,7 @@ pub struct Tally {
     pairs_capture: Pairs,
     pairs_by_kind: [Pairs; 4],
     background: Group,
+    with_groups: Group,
     by_effects: [Group; EFFECTS.len()],
     per_fault: BTreeMap<FaultName, Group>,
     confidence: [Confidence; BINS],
@@ -281,6 +297,9 @@ impl Tally {
         if case.has_background {
             self.background.add(fault);
         }
+        if case.has_group {
+            self.with_groups.add(fault);
+        }
         let of_effects = EFFECTS.iter().position(|(_, most)| fault.effects <= *most);
         if let Some(group) = of_effects.and_then(|at| self.by_effects.get_mut(at)) {
             group.add(fault);
@@ -367,6 +386,7 @@ impl Tally {
             without_card_counters: self.without_card.report(),
             rings: self.rings.report(),
             beside_background: self.background.report(),
+            with_hot_connect: self.with_groups.report(),
             left_out: self
                 .left_out
                 .iter()

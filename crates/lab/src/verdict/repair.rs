@@ -1,12 +1,13 @@
-//! Repairs: the part that the cause and place of a verdict blame, and whether its exchange mends the fault.
+//! Repairs: the part that the cause and place of a verdict blame, and the parts whose exchange mends a fault.
 //!
-//! The part follows from cause and place; the sentences of a report are not read, and nothing is exchanged and tried.
-//! Two causes at one place may need different repairs, and one repair may mend several causes: another cable mends a
-//! worn one and not a transmitter, and whoever sees to the supply mends a dip as well as a failure.
+//! The part follows from cause and place; the sentences of a report are not read. Two causes at one place may need
+//! different repairs, and one repair may mend several causes: another cable mends a worn one and not a transmitter, and
+//! whoever sees to the supply mends a dip as well as a failure. Whether it helps is tried in `score::repair_trial`.
 
 use linesman_config::fault::FaultName::{self, *};
 use linesman_proto::address::DeviceId;
 use linesman_proto::topology::{End, Tree};
+use linesman_sim::fault::Carrier;
 
 use super::claim::Claim;
 use super::site::{Site, Way};
@@ -72,12 +73,10 @@ fn part(cause: FaultName, site: Site) -> Option<RepairedPart> {
         Site::Host => Some(End::MainDevice(linesman_proto::address::Path::A)),
         Site::Device(_) | Site::Network => None,
     };
-    match cause {
-        LinkOpen | FalseLink | LinkFlapping | EarlyLink | RingOpen | CableDegraded => {
-            near.map(RepairedPart::Cable)
-        }
-        EmcNoise => near.map(RepairedPart::NoiseSource),
-        TransmitterDamaged | ReceiverDamaged => {
+    match Carrier::of(cause) {
+        Carrier::Cable => near.map(RepairedPart::Cable),
+        Carrier::NoiseSource => near.map(RepairedPart::NoiseSource),
+        Carrier::Sender | Carrier::Receiver => {
             let Some(end) = sending_or_receiving(cause, site) else {
                 return device.map(RepairedPart::Device);
             };
@@ -86,18 +85,16 @@ fn part(cause: FaultName, site: Site) -> Option<RepairedPart> {
                 End::Controller(id, _) => RepairedPart::Device(id),
             })
         }
-        DeviceInternal | FirmwareFault | MailboxError | MailboxSlow | MailboxStuck | Emergency
-        | ClockDrift | ReferenceClockLost => device.map(RepairedPart::Device),
-        DeviceOff | SupplyOff | BrownOut | EbusOverload => device.map(RepairedPart::Supply),
-        InitRefused | ConfigMismatch | WatchdogStarved | CycleTooFast | SyncLost => {
+        Carrier::Device => device.map(RepairedPart::Device),
+        Carrier::Supply => device.map(RepairedPart::Supply),
+        Carrier::Settings => {
             device.map_or(Some(RepairedPart::Computer), |id| Some(RepairedPart::Settings(id)))
         }
-        DeviceMissing | DeviceWrong | DeviceExtra | DevicesSwapped | TwinsSwapped
-        | PortsSwapped | DuplicateAddress => device.map(RepairedPart::Wiring),
-        MainDeviceWrongPort => Some(RepairedPart::Wiring(DeviceId(0))),
-        NicDamaged => Some(RepairedPart::Card),
-        HostDrops | HostJitter | LateFrames | OneSidedRecording => Some(RepairedPart::Computer),
-        SecondMainDevice | ForeignFrames => Some(RepairedPart::OtherSender),
+        Carrier::Wiring if cause == MainDeviceWrongPort => Some(RepairedPart::Wiring(DeviceId(0))),
+        Carrier::Wiring => device.map(RepairedPart::Wiring),
+        Carrier::Card => Some(RepairedPart::Card),
+        Carrier::Computer => Some(RepairedPart::Computer),
+        Carrier::OtherSender => Some(RepairedPart::OtherSender),
     }
 }
 

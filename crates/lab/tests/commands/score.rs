@@ -1,5 +1,6 @@
 //! A slice of the score: floors below which the diagnosis must not fall, and that it can be measured again.
 
+use linesman_config::fault::FaultName;
 use linesman_lab::score::{Perturbation, ScoreOptions, Tally, run_case};
 
 #[test]
@@ -38,6 +39,19 @@ fn cases_that_were_once_judged_wrongly_are_judged_right() {
         assert_eq!(report.effective_cases, 1, "{what}");
         assert!(report.wrong.is_empty(), "{what}: {:?}", report.wrong);
     }
+}
+
+#[test]
+fn what_one_look_cannot_tell_apart_is_mended_by_the_exchange_after_the_second() {
+    let fault = Some(FaultName::DeviceOff);
+    let options = ScoreOptions { fault, tries_repairs: true, ..ScoreOptions::default() };
+    let cases = (1..9).map(|seed| run_case(seed, &options));
+    let faults: Vec<_> = cases.flat_map(|case| case.faults).collect();
+    let mended: Vec<_> =
+        faults.iter().filter_map(|fault| fault.repair).map(|trial| trial.mended_by).collect();
+    // A dead SubDevice looks like an open link to it, until another cable was no help.
+    assert!(mended.contains(&Some(2)), "{mended:?}");
+    assert!(mended.iter().all(Option::is_some), "{mended:?}");
 }
 
 #[test]

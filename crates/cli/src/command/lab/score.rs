@@ -54,6 +54,10 @@ pub(crate) struct Arguments {
     /// SEED-recording.json
     #[arg(long, value_name = "DIRECTORY")]
     reports: Option<PathBuf>,
+    /// Leave out the repairs: without this what a finding blames is exchanged, and where that was in vain, the line is
+    /// looked at again
+    #[arg(long)]
+    no_repairs: bool,
     /// Write each case to this new file, schema linesman.score-part/1, for `lab merge`
     #[arg(long, value_name = "FILE.json")]
     part: Option<PathBuf>,
@@ -90,6 +94,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         healthy_for: arguments.lasts.unwrap_or(Span::ZERO),
         perturb: arguments.perturb,
         habit: arguments.habit,
+        tries_repairs: !arguments.no_repairs,
         keeps_heard: arguments.record.is_some(),
         keeps_reports: arguments.reports.is_some(),
     };

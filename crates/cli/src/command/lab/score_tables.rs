@@ -75,6 +75,17 @@ fn singles(report: &ScoreReport, output: &mut Output) {
     ]);
     table.row(["no diagnosis", "0.0 %", "-", "-", "-", "-", "-"].map(str::to_owned));
     output.text(&table.render());
+    if let Some(tried) = report.single.repairs_tried {
+        output.line("");
+        output.line(&format!(
+            "Repairs tried in {}: mended by the first exchange {} {}, by the second at most {}, by the third {}.",
+            count(tried.mended_by_first.of, "case"),
+            share(tried.mended_by_first),
+            interval(tried.mended_by_first),
+            share(tried.by_second),
+            share(tried.by_third),
+        ));
+    }
 }
 
 /// Lines on which nothing was wrong.
@@ -213,6 +224,7 @@ fn groups(report: &ScoreReport, output: &mut Output) {
             "place, set",
             "cause, set",
             "repair",
+            "2nd",
             "course",
             "recording",
             "others",
@@ -234,6 +246,7 @@ fn groups(report: &ScoreReport, output: &mut Output) {
             share(side.place_at_1_set),
             share(side.cause_at_1_set),
             share(side.repair_at_1),
+            group.repairs_tried.map_or_else(|| "-".to_owned(), |tried| share(tried.by_second)),
             share(group.baseline),
             format!("{} / {}", share(recording.place_at_1_set), share(recording.cause_at_1_set)),
             side.other_findings.to_string(),
@@ -256,6 +269,7 @@ fn groups(report: &ScoreReport, output: &mut Output) {
     add("without the card's counters", &report.without_card_counters);
     add("in rings", &report.rings);
     add("beside rare errors elsewhere", &report.beside_background);
+    add("with a hot connect group", &report.with_hot_connect);
     add("each of two", &report.double.faults);
     output.text(&table.render());
 }

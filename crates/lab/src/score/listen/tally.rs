@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use linesman_config::fault::FaultName::{self, *};
 
-use super::super::play::{CaseReport, FaultOutcome};
+use super::super::outcome::{CaseReport, FaultOutcome};
 use super::super::rate::Count;
 use super::report::{
     HealthyListenedReport, HealthyPair, HealthyRates, ListenedReport, ListenerPair, ListenerReport,
