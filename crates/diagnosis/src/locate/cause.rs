@@ -17,10 +17,11 @@ use linesman_proto::time::Instant;
 use linesman_proto::topology::route::Direction;
 use linesman_proto::topology::{End, Hop};
 
-use super::cause_weights::{CauseSeat, LinkSymptom};
+use super::cause_weights::{CauseSeat, LinkSymptom, NOISE_ON_TERMINAL_BUS};
 use super::damage::{Damage, LastHop, Located};
 use super::input::LocateInput;
 use super::rhythm::{falls_together, is_steady};
+use crate::model::is_on_terminal_bus;
 
 /// From this many hits on, their distribution says something.
 const MANY: u64 = 8;
@@ -341,12 +342,18 @@ fn single(input: &LocateInput<'_>, group: &DamageGroup) -> Vec<Suspect> {
         !symptom.is_complete() && group.damages.iter().all(|damage| damage.symbols.is_none());
     let share = if is_unread { 0.8 } else { 1.0 };
     let weights = symptom.weights().iter();
+    // Whoever is entered by a link tells what kind it is.
+    let behind = input.tree().links().get(hop.link).and_then(|link| link.downstream.node());
+    let is_of_bus = behind.is_some_and(|node| is_on_terminal_bus(input.model(), node));
+    let noise = if is_of_bus { NOISE_ON_TERMINAL_BUS } else { 1.0 };
     let mut list: Vec<Suspect> = weights
         .filter_map(|(cause, seat, weight)| {
+            let of_bus = if *cause == FaultName::EmcNoise { noise } else { 1.0 };
             let (cause, spot) = seated(*cause, *seat, spot, hop)?;
-            Some(suspect(cause, spot, weight * share))
+            Some(suspect(cause, spot, weight * share * of_bus))
         })
         .collect();
+    list.sort_by(|one, other| other.weight.total_cmp(&one.weight));
     if symptom.is_complete() {
         return list;
     }

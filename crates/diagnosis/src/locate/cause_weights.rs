@@ -50,6 +50,9 @@ pub(super) enum LinkSymptom {
     OneDirectionFew,
 }
 
+/// Share of the weight of noise on the terminal bus: a few millimetres within a row of housings, with no cable to couple into.
+pub(super) const NOISE_ON_TERMINAL_BUS: f64 = 0.25;
+
 impl LinkSymptom {
     /// The causes of the row.
     pub(super) const fn weights(self) -> &'static [Weight] {

@@ -21,11 +21,10 @@ use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
-use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::locate::cut_distance;
-use crate::model::{NetworkModel, Seen};
+use crate::model::{NetworkModel, Seen, is_on_terminal_bus};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {

@@ -35,7 +35,6 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::DeviceId;
 use linesman_proto::port::Port;
 use linesman_proto::register::{ErrorCounter, table};
-use linesman_proto::sii::PortKind;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
@@ -43,7 +42,7 @@ use super::wiring::entry;
 use super::{Rule, RulePage, View};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::locate::{LinkLoss, LinkLosses};
-use crate::model::{NetworkModel, Seen, search};
+use crate::model::{NetworkModel, Seen, is_on_terminal_bus, search};
 
 pub(super) use follows::follows;
 
@@ -375,27 +374,6 @@ pub(super) fn is_one_sided(model: &NetworkModel, tree: &Tree, drops: &LinkLosses
         }
     };
     matches!((saw(link.upstream), saw(link.downstream)), (Some(one), Some(other)) if one != other)
-}
-
-/// Whether a device hangs on the terminal bus, as far as its EEPROM, its type and the one before it tell: there a contact and the device
-/// behind it fail alike.
-pub(super) fn is_on_terminal_bus(model: &NetworkModel, node: usize) -> bool {
-    let tree = model.tree.as_ref().filter(|tree| node < tree.len());
-    // What its EEPROM says of the port by which frames come in.
-    match tree.and_then(|tree| Some(model.devices[node].sii.power()?.ports[tree.entry(node)])) {
-        Some(PortKind::EBus) => return true,
-        Some(PortKind::Mii | PortKind::FastHotConnect) => return false,
-        Some(PortKind::None | PortKind::Other(_)) | None => {}
-    }
-    let type_of = |node: usize| model.devices[node].type_name.as_deref().unwrap_or_default();
-    let is_of = |node: usize, families: &[&str]| {
-        families.iter().any(|family| type_of(node).starts_with(family))
-    };
-    // Junctions and extensions are called like couplers; but port B of a coupler is the bus, whoever is there.
-    let above = tree.and_then(|tree| tree.upstream(node));
-    let is_behind_coupler =
-        matches!(above, Some(End::Controller(near, Port::B)) if is_of(near, &["EK"]));
-    is_of(node, &["EL", "ES", "EJ", "EM", "KM"]) || is_behind_coupler
 }
 
 /// What the loss is about: both ends, and the card's link if it is one of them.

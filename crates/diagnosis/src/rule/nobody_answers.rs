@@ -35,7 +35,6 @@ use linesman_config::fault::{Class, FaultName};
 use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::topology::End;
 
-use super::link_lost::is_on_terminal_bus;
 use super::{Rule, RulePage, View};
 use crate::finding::{Condition, Evidence, LinkEnd, Place, Severity, Symptom};
 use crate::model::{NetworkModel, Seen};

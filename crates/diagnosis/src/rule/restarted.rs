@@ -36,7 +36,7 @@ use linesman_proto::topology::End;
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
 use crate::locate::LinkLosses;
-use crate::model::{AlChange, AlError, Device, NetworkModel, Seen};
+use crate::model::{AlChange, AlError, Device, NetworkModel, Seen, is_on_terminal_bus};
 
 /// Back in INIT.
 pub const RESTARTED: RulePage = RulePage {
@@ -107,7 +107,7 @@ impl Fall<'_> {
         // A contact of the terminal bus has its link at once, if the one before kept its own.
         let bound = if falls > 1 {
             LONG
-        } else if is_alone && link_lost::is_on_terminal_bus(model, node) {
+        } else if is_alone && is_on_terminal_bus(model, node) {
             DIP
         } else {
             shortest_outage(model).map_or(LONG, |link_up| LONG.min(link_up + DIP))
@@ -232,7 +232,7 @@ fn shortest_outage(model: &NetworkModel) -> Option<Span> {
         [Some(device.id), behind.filter(|_| port != Port::A)]
             .into_iter()
             .flatten()
-            .all(|id| !link_lost::is_on_terminal_bus(model, id.index()))
+            .all(|id| !is_on_terminal_bus(model, id.index()))
     };
     let ports = |device| Port::ALL.into_iter().map(move |port| (device, port));
     let all = model.devices.iter().flat_map(ports);
@@ -272,7 +272,7 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
     }
-    if feeder.is_none() && link_lost::is_on_terminal_bus(model, device.id.index()) {
+    if feeder.is_none() && is_on_terminal_bus(model, device.id.index()) {
         // Terminals that lose the voltage of the E-bus start anew, whatever took it.
         condition = condition.or(FaultName::EbusOverload, 0.05);
     }

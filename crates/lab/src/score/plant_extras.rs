@@ -34,7 +34,7 @@ pub(super) fn add_supplies(file: &mut SegmentFile, stream: &mut Stream) {
 /// Makes one station at a cable a hot connect group in some cases, known by its alias: one that no ring runs through
 /// and that nothing but its terminals hangs behind.
 pub(super) fn add_group(file: &mut SegmentFile, project: &mut Project, stream: &mut Stream) {
-    if !stream.chance(0.15) {
+    if !stream.chance(0.5) {
         return;
     }
     let Ok(tree) = project.tree() else { return };

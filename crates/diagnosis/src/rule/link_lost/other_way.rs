@@ -4,9 +4,9 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Tree};
 
-use super::is_on_terminal_bus;
 use crate::locate::{LinkLoss, LinkLosses};
 use crate::model::NetworkModel;
+use crate::model::is_on_terminal_bus;
 
 /// Both ends of a link are read in turns as quick as this where what was read of them can be compared.
 const SOON: Span = Span::ms(200);

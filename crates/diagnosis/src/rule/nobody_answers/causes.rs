@@ -5,9 +5,9 @@ use linesman_proto::time::Instant;
 
 use super::{PAGE, first_device, first_link, outage_location};
 use crate::finding::{Condition, Evidence, LinkDirection, Place};
+use crate::model::is_on_terminal_bus;
 use crate::model::{NetworkModel, Seen, Silence};
 use crate::rule::View;
-use crate::rule::link_lost::is_on_terminal_bus;
 
 /// Likelihood that it is the card.
 const CARD: f64 = 0.1;

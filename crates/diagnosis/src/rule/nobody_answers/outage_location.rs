@@ -5,8 +5,8 @@ use linesman_proto::time::Span;
 use linesman_proto::topology::Route;
 use linesman_proto::topology::route::Direction;
 
-use super::is_on_terminal_bus;
 use crate::finding::{LinkDirection, Place};
+use crate::model::is_on_terminal_bus;
 use crate::model::{Device, NetworkModel, Silence};
 use crate::rule::View;
 

@@ -4,9 +4,9 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::{End, Link, Tree};
 
+use crate::model::is_on_terminal_bus;
 use crate::model::{Absence, Device, NetworkModel, Seen};
 use crate::rule::View;
-use crate::rule::link_lost::is_on_terminal_bus;
 
 /// Who did not answer for so long was away.
 const LONG: Span = Span::ms(100);

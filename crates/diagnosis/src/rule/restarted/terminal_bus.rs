@@ -3,8 +3,8 @@
 use linesman_proto::address::DeviceId;
 use linesman_proto::topology::Tree;
 
-use super::{Fall, TOGETHER, link_lost};
-use crate::model::NetworkModel;
+use super::{Fall, TOGETHER};
+use crate::model::{NetworkModel, is_on_terminal_bus};
 
 /// What feeds all that fell together, where these are two terminals or more and reach to the end of its terminal
 /// bus: the voltage falls along the contacts, so that the last ones go first. One that did not fall has its supply.
@@ -23,7 +23,7 @@ pub(super) fn common_feeder(model: &NetworkModel, together: &[Fall<'_>]) -> Opti
 /// Feeder of a terminal: the nearest one before it that says that it supplies, or is no terminal.
 fn feeder(model: &NetworkModel, tree: &Tree, node: usize) -> Option<usize> {
     let mut node = node;
-    while link_lost::is_on_terminal_bus(model, node) {
+    while is_on_terminal_bus(model, node) {
         node = tree.upstream(node)?.node()?;
         let power = model.devices[node].power;
         if power.is_some_and(|power| power.value.ebus_current_ma < 0) {

@@ -7,8 +7,8 @@ use linesman_proto::topology::{End, Tree};
 
 use super::{Suspects, shares};
 use crate::locate::cut_distance;
+use crate::model::is_on_terminal_bus;
 use crate::model::{Cyclic, Deficit, NetworkModel};
-use crate::rule::link_lost::is_on_terminal_bus;
 
 /// Datagrams of one cycle, and of slower ones, lose their shares so soon after each other.
 const AT_ONCE: Span = Span::ms(500);
