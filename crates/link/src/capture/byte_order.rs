@@ -23,6 +23,15 @@ impl ByteOrder {
 
     /// A number that was read as little-endian.
     #[inline]
+    pub(super) const fn u16(self, number: u16) -> u16 {
+        match self {
+            Self::Little => number,
+            Self::Big => number.swap_bytes(),
+        }
+    }
+
+    /// A number that was read as little-endian.
+    #[inline]
     pub(super) const fn u32(self, number: u32) -> u32 {
         match self {
             Self::Little => number,

@@ -13,12 +13,14 @@ mod error;
 mod fcs;
 mod frame;
 mod link_type;
+mod merged;
 mod pcap;
 mod pcap_writer;
 mod pcapng;
 mod pcapng_options;
 mod pcapng_writer;
 mod probe_clock;
+mod read_ahead;
 mod reader;
 mod run_clock;
 mod window;
@@ -30,7 +32,9 @@ pub use frame::{
     FrameDirection, FrameNumber, SkippedLinkType, TimeResolution,
 };
 pub use link_type::LinkType;
+pub use merged::MergedCaptures;
 pub use pcap_writer::PcapWriter;
 pub use pcapng_writer::{FrameToWrite, InterfaceToWrite, PcapngWriter};
+pub use read_ahead::ReadAhead;
 pub use reader::CaptureReader;
 pub use run_clock::{Backward, Moment, RunClock};

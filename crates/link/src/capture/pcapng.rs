@@ -1,12 +1,11 @@
 //! The pcapng format: blocks, of which some carry frames.
 //!
 //! Reference: draft-ietf-opsawg-pcapng, section 3 (how blocks lie) and 4 (each kind). `pcap-parser`
-//! reads the blocks and their options; what is here makes whole blocks of a stream, and does what
-//! that library does not:
+//! reads the blocks and their options, but for those of frames, which are read where they lie; what is here makes whole
+//! blocks of a stream, and does what that library does not:
 //!
 //! * it passes over blocks that carry no frames unread, however long, so that they need no memory;
-//! * it compares the two lengths of each block, and finds a frame that is longer than its block,
-//!   which the library takes for a block that is cut off;
+//! * it compares the two lengths of each block, and finds a frame that is longer than its block;
 //! * it takes blocks whose length leaves out the padding, and the obsolete packet block;
 //! * it stops at the end mark of options, and minds their byte order;
 //! * it keeps time stamps of any step, offset and century (the library: seconds in 32 bits).
@@ -18,8 +17,7 @@ use pcap_parser::PcapError;
 use pcap_parser::nom::IResult;
 use pcap_parser::pcapng::{
     BOM_MAGIC, CB_MAGIC, DCB_MAGIC, EPB_MAGIC, IDB_MAGIC, ISB_MAGIC, SHB_MAGIC, SJE_MAGIC,
-    SPB_MAGIC, parse_enhancedpacketblock_be, parse_enhancedpacketblock_le,
-    parse_interfacedescriptionblock_be, parse_interfacedescriptionblock_le,
+    SPB_MAGIC, parse_interfacedescriptionblock_be, parse_interfacedescriptionblock_le,
     parse_interfacestatisticsblock_be, parse_interfacestatisticsblock_le, parse_sectionheaderblock,
     parse_simplepacketblock_be, parse_simplepacketblock_le,
 };
@@ -210,22 +208,22 @@ impl Pcapng {
         drops: Option<u64>,
         described: &mut [CaptureInterface],
     ) -> Result<Record, Damage> {
-        // Checked before, because the library would wait for the rest of such a frame.
-        check_frame_len(self.order.u32_at(block, 20), block.len() - 4 - ENHANCED_DATA)?;
-        let packet = read(match self.order {
-            ByteOrder::Little => parse_enhancedpacketblock_le(block),
-            ByteOrder::Big => parse_enhancedpacketblock_be(block),
-        })?;
-        let id = self.find(packet.if_id)?;
-        let options = FrameOptions::read(self.order, &packet.options);
+        let [interface, ticks_high, ticks_low, len, original_len] =
+            [8, 12, 16, 20, 24].map(|at| self.order.u32_at(block, at));
+        let room = block.len() - 4 - ENHANCED_DATA;
+        check_frame_len(len, room)?;
+        let id = self.find(interface)?;
+        let padded = (len as usize).next_multiple_of(4).min(room);
+        let options = &block[ENHANCED_DATA + padded..block.len() - 4];
+        let options = FrameOptions::read(self.order, options);
         self.count_drops(id, drops.unwrap_or(options.drops), described);
         let interface = &self.interfaces[id];
-        let ticks = u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low);
+        let ticks = u64::from(ticks_high) << 32 | u64::from(ticks_low);
         let nanos = interface.resolution.nanos(ticks) + interface.offset_nanos;
         Ok(Record {
             at: ENHANCED_DATA,
-            len: packet.caplen as usize,
-            original_len: packet.origlen,
+            len: len as usize,
+            original_len,
             interface: CaptureInterfaceId(id as u32),
             time: Some(UnixTime::from_nanos(nanos)),
             direction: options.direction,

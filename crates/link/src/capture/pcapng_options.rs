@@ -2,7 +2,7 @@
 //!
 //! Reference: draft-ietf-opsawg-pcapng, section 3.5 and the option tables of each block.
 //! `pcap-parser` takes them apart, but reads on behind the end mark and takes every number for
-//! little-endian. Options that are cut off, or of a length that theirs never is, are left out: they
+//! little-endian; those of frames are read here, where they lie. Options that are cut off, or of a length that theirs never is, are left out: they
 //! never carry a frame.
 
 use pcap_parser::pcapng::{OptionCode, PcapNGOption};
@@ -88,13 +88,32 @@ impl FrameOptions {
     /// Of the option `epb_dropcount`, which the library has no name for.
     const DROP_COUNT: OptionCode = OptionCode(4);
 
+    /// Reads them where they lie: a capture has some in each of its frames.
     #[inline]
-    pub(super) fn read(order: ByteOrder, options: &[PcapNGOption<'_>]) -> Self {
+    pub(super) fn read(order: ByteOrder, mut options: &[u8]) -> Self {
         let mut read = Self::default();
-        for option in before_the_end(options) {
-            match option.code {
-                Self::FLAGS => read.take_flags(option.as_u32_le().map_or(0, |n| order.u32(n))),
-                Self::DROP_COUNT => read.drops = number(order, option).unwrap_or(0),
+        while let Some((head, rest)) = options.split_first_chunk::<4>() {
+            let [code, len] = [[head[0], head[1]], [head[2], head[3]]].map(u16::from_le_bytes);
+            let (code, len) = (OptionCode(order.u16(code)), usize::from(order.u16(len)));
+            if code == OptionCode::EndOfOpt {
+                break;
+            }
+            // Padded to four bytes; one that is cut off ends them.
+            let Some((value, behind)) = rest.split_at_checked(len.next_multiple_of(4)) else {
+                break;
+            };
+            options = behind;
+            match (code, len) {
+                (Self::FLAGS, 4) => {
+                    let flags = value.first_chunk().map_or(0, |word| u32::from_le_bytes(*word));
+                    read.take_flags(order.u32(flags));
+                }
+                (Self::FLAGS, _) => read.take_flags(0),
+                (Self::DROP_COUNT, 8) => {
+                    let drops = value.first_chunk().map_or(0, |word| u64::from_le_bytes(*word));
+                    read.drops = order.u64(drops);
+                }
+                (Self::DROP_COUNT, _) => read.drops = 0,
                 _ => {}
             }
         }
@@ -179,6 +198,24 @@ mod tests {
     #[test]
     fn the_check_sequence_is_four_bytes_in_bits_or_bytes() {
         assert_eq!((fcs_bytes(0), fcs_bytes(4), fcs_bytes(32)), (0, 4, 4));
+    }
+
+    #[test]
+    fn options_of_a_frame_are_read_in_both_orders_up_to_the_end_mark() {
+        let comment = [0, 1, 0, 3, b'a', b'b', b'c', 0];
+        let big = [0, 2, 0, 4, 0, 0, 0, 2, 0, 4, 0, 8, 0, 0, 0, 0, 0, 0, 0, 7];
+        let read = FrameOptions::read(ByteOrder::Big, &[&comment[..], &big].concat());
+        assert_eq!((read.direction, read.drops), (FrameDirection::Outgoing, 7));
+        let little = [2, 0, 4, 0, 1, 0, 0, 0, 0, 0, 0, 0, 2, 0, 4, 0, 2, 0, 0, 0];
+        let read = FrameOptions::read(ByteOrder::Little, &little);
+        assert_eq!(read.direction, FrameDirection::Incoming, "what is behind the mark is nothing");
+        for len in 0..8 {
+            let read = FrameOptions::read(ByteOrder::Little, &little[..len]);
+            assert_eq!(read.direction, FrameDirection::Unknown, "of {len} bytes");
+        }
+        let odd = [2, 0, 3, 0, 1, 0, 0, 0, 4, 0, 4, 0, 1, 0, 0, 0];
+        let read = FrameOptions::read(ByteOrder::Little, &odd);
+        assert_eq!((read.direction, read.drops), (FrameDirection::Unknown, 0), "wrong lengths");
     }
 
     #[test]

@@ -260,6 +260,11 @@ impl CaptureReader {
         self.progress.share()
     }
 
+    /// The same for whoever asks while another one reads.
+    pub(super) fn progress_handle(&self) -> Progress {
+        self.progress.clone()
+    }
+
     /// How the capture ended; `None` before [`next_frame`](Self::next_frame) gave `None`.
     #[must_use]
     pub fn end(&self) -> Option<&CaptureEnd> {
