@@ -1,6 +1,6 @@
 //! Error counters of one controller over time: the first reading is history, rises count.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::port::Port;
@@ -17,7 +17,7 @@ const END: u64 = 255;
 /// All counters of one controller.
 #[derive(Clone, Default, Debug)]
 pub struct CounterHistory {
-    tracks: BTreeMap<ErrorCounter, CounterTrack>,
+    tracks: CounterTracks,
     /// Falls without a write that was seen: the line has another reader, or the supply was gone.
     clears: u32,
     /// When that was last read, and before which fall.
@@ -32,6 +32,59 @@ pub struct CounterHistory {
     may_be_cleared: [Option<Instant>; ClearGroup::ALL.len()],
     /// When the counter that fell had been read before.
     before_cleared: Instant,
+}
+
+/// Tracks of the counters that were read, in the order of [`ErrorCounter`]. A slot for each, since they are looked up
+/// for each reading.
+#[derive(Clone, Default, Debug)]
+struct CounterTracks([Option<Box<CounterTrack>>; COUNTERS.len()]);
+
+/// All counters in their order, by kind and port.
+const COUNTERS: [ErrorCounter; ErrorCounter::ALL.len()] = {
+    use ErrorCounter::{Forwarded, InvalidFrame, LostLink, Pdi, PhysicalLayer, ProcessingUnit};
+    use Port::{A, B, C, D};
+    [
+        InvalidFrame(A),
+        InvalidFrame(B),
+        InvalidFrame(C),
+        InvalidFrame(D),
+        PhysicalLayer(A),
+        PhysicalLayer(B),
+        PhysicalLayer(C),
+        PhysicalLayer(D),
+        Forwarded(A),
+        Forwarded(B),
+        Forwarded(C),
+        Forwarded(D),
+        ProcessingUnit,
+        Pdi,
+        LostLink(A),
+        LostLink(B),
+        LostLink(C),
+        LostLink(D),
+    ]
+};
+
+impl CounterTracks {
+    /// Index of a counter in [`COUNTERS`].
+    const fn index(counter: ErrorCounter) -> usize {
+        match counter {
+            ErrorCounter::InvalidFrame(port) => port as usize,
+            ErrorCounter::PhysicalLayer(port) => 4 + port as usize,
+            ErrorCounter::Forwarded(port) => 8 + port as usize,
+            ErrorCounter::ProcessingUnit => 12,
+            ErrorCounter::Pdi => 13,
+            ErrorCounter::LostLink(port) => 14 + port as usize,
+        }
+    }
+
+    fn get(&self, counter: ErrorCounter) -> Option<&CounterTrack> {
+        self.0.get(Self::index(counter))?.as_deref()
+    }
+
+    fn get_mut(&mut self, counter: ErrorCounter) -> Option<&mut CounterTrack> {
+        self.0.get_mut(Self::index(counter))?.as_deref_mut()
+    }
 }
 
 /// One counter over time.
@@ -157,7 +210,7 @@ impl CounterHistory {
         fell: &mut [bool; ClearGroup::ALL.len()],
         seen: Seen<()>,
     ) {
-        let Some(track) = self.tracks.get(&counter) else { return };
+        let Some(track) = self.tracks.get(counter) else { return };
         let (last, read) = (track.last.value, track.last.at);
         if value < last {
             let group = counter.clear_group() as usize;
@@ -180,10 +233,10 @@ impl CounterHistory {
         frame: Option<u64>,
         news: &mut bool,
     ) -> &mut CounterTrack {
-        self.tracks.entry(counter).or_insert_with(|| {
+        self.tracks.0[CounterTracks::index(counter)].get_or_insert_with(|| {
             *news = true;
             let seen = Seen::new(value, at, frame);
-            CounterTrack {
+            Box::new(CounterTrack {
                 first: seen,
                 last: seen,
                 is_total: false,
@@ -191,13 +244,13 @@ impl CounterHistory {
                 total: Total::default(),
                 before_spell: 0,
                 rises: VecDeque::new(),
-            }
+            })
         })
     }
 
     /// Notes that the value before a counter's first reading is not known, and was taken for 0.
     pub fn note_may_be_old(&mut self, counter: ErrorCounter) {
-        if let Some(track) = self.tracks.get_mut(&counter) {
+        if let Some(track) = self.tracks.get_mut(counter) {
             track.may_be_old = true;
         }
     }
@@ -212,7 +265,7 @@ impl CounterHistory {
             if counter.clear_group() != group {
                 continue;
             }
-            if let Some(track) = self.tracks.get_mut(&counter) {
+            if let Some(track) = self.tracks.get_mut(counter) {
                 track.total.note_own_clear();
                 track.last.value = 0;
             }
@@ -237,18 +290,19 @@ impl CounterHistory {
     /// One counter over time; `None` when it was never read.
     #[must_use]
     pub fn track(&self, counter: ErrorCounter) -> Option<&CounterTrack> {
-        self.tracks.get(&counter)
+        self.tracks.get(counter)
     }
 
     /// All counters that were read, in order of addresses within their kind.
     pub fn tracks(&self) -> impl Iterator<Item = (ErrorCounter, &CounterTrack)> {
-        self.tracks.iter().map(|(counter, track)| (*counter, track))
+        let read = COUNTERS.into_iter().zip(&self.tracks.0);
+        read.filter_map(|(counter, track)| Some((counter, track.as_deref()?)))
     }
 
     /// By how much a counter rose since its first reading, through clears; 0 when never read.
     #[must_use]
     pub fn rise(&self, counter: ErrorCounter) -> u64 {
-        self.tracks.get(&counter).map_or(0, |track| track.total.rise())
+        self.tracks.get(counter).map_or(0, |track| track.total.rise())
     }
 
     /// Whether any counter of a port rose: invalid frames or physical-layer errors.
@@ -261,22 +315,25 @@ impl CounterHistory {
     /// Whether any counter was read at all.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        !self.tracks.is_empty()
+        self.tracks.0.iter().any(Option::is_some)
     }
 
     /// When the errors happened that a reading shows, at the earliest; `None` when it shows none.
     #[must_use]
     pub fn errors_since(&self, start: RegisterAddress, data: &[u8]) -> Option<Instant> {
+        if data.iter().all(|byte| *byte == 0) {
+            return None;
+        }
         let reading = ErrorCounters::from_bytes(data, start);
         let risen = reading.iter().filter(|(counter, value)| {
             *value > 0 && self.latest(*counter).is_some_and(|last| last != u64::from(*value))
         });
-        risen.filter_map(|(counter, _)| Some(self.tracks.get(&counter)?.last.at)).min()
+        risen.filter_map(|(counter, _)| Some(self.tracks.get(counter)?.last.at)).min()
     }
 
     /// A new spell of errors begins: what was counted so far belongs to earlier ones.
     pub fn begin_spell(&mut self) {
-        for track in self.tracks.values_mut() {
+        for track in self.tracks.0.iter_mut().flatten() {
             track.before_spell = track.total.rise();
             track.total.begin_anew();
         }
@@ -309,7 +366,7 @@ impl CounterHistory {
     /// The latest value of a counter; `None` when it was never read.
     #[must_use]
     pub fn latest(&self, counter: ErrorCounter) -> Option<u64> {
-        self.tracks.get(&counter).map(|track| track.last.value)
+        self.tracks.get(counter).map(|track| track.last.value)
     }
 }
 
@@ -370,5 +427,18 @@ impl CounterTrack {
     #[must_use]
     pub fn last_rise(&self) -> Option<&Rise> {
         self.rises.back()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_counter_has_a_slot_of_its_own_in_their_order() {
+        assert!(COUNTERS.is_sorted());
+        for (index, counter) in COUNTERS.into_iter().enumerate() {
+            assert_eq!(CounterTracks::index(counter), index, "{counter}");
+        }
     }
 }
