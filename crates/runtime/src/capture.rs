@@ -1,5 +1,5 @@
-//! A capture as the diagnosis sees it: frames in the order of the file, in times of the run. The files of one ring are one
-//! capture.
+//! A capture as the diagnosis sees it: frames in the order of the file, in times of the run. The files of one ring of files
+//! are one capture, and so are those that were recorded side by side, as at both cards of a ring.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use linesman_diagnosis::observe::{Direction, FrameSeen};
 use linesman_link::capture::{
     CaptureEnd, CaptureError, CaptureInterface, CaptureInterfaceId, CaptureReader, CapturedFrame,
-    FrameDirection, FrameNumber, RunClock, SkippedLinkType,
+    FrameDirection, FrameNumber, MergedCaptures, ReadAhead, RunClock, SkippedLinkType,
 };
 use linesman_link::input::Input;
 use linesman_link::unix_time::UnixTime;
@@ -19,9 +19,19 @@ const LONGEST_SILENCE: Span = Span::s(86_400);
 
 /// A capture that is being read.
 pub struct Capture {
-    reader: CaptureReader,
+    source: FrameSource,
     clock: RunClock,
     files: RecordingFiles,
+}
+
+/// Reader of the present file, or of all files that were recorded side by side.
+enum FrameSource {
+    /// It is read as its frames are asked for: what comes through a pipe is shown as soon as it is there.
+    Direct(CaptureReader),
+    /// A thread reads ahead.
+    Ahead(ReadAhead),
+    /// Several files by the times of their frames.
+    Merged(MergedCaptures),
 }
 
 /// A frame of a capture, twice.
@@ -77,6 +87,23 @@ impl Capture {
         Ok(capture)
     }
 
+    /// Opens files that were recorded at the same time by clocks that agree, as at both cards of a ring. Frames are
+    /// numbered through in the order of their times.
+    ///
+    /// # Errors
+    /// When one of them is no capture, or is damaged in its first block.
+    pub fn side_by_side(paths: &[PathBuf]) -> Result<Self, CaptureError> {
+        let mut first = None;
+        for path in paths {
+            let origin = RunClock::for_file(path)?.origin();
+            first = origin.into_iter().chain(first).min();
+        }
+        let clock = first.map_or_else(RunClock::default, RunClock::starting_at);
+        let source = FrameSource::Merged(MergedCaptures::open(paths)?);
+        let files = RecordingFiles { count: 1, ..RecordingFiles::default() };
+        Ok(Self { source, clock, files })
+    }
+
     /// Reads a capture from an input. Of a file the run begins with the earliest frame of any
     /// interface; a pipe cannot be read twice, and the run begins with its first frame.
     ///
@@ -87,15 +114,17 @@ impl Capture {
             true => RunClock::for_file(input.name())?,
             false => RunClock::default(),
         };
+        let is_file = input.is_file();
+        let source = FrameSource::of(CaptureReader::of(input)?, is_file);
         let files = RecordingFiles { count: 1, ..RecordingFiles::default() };
-        Ok(Self { clock, reader: CaptureReader::of(input)?, files })
+        Ok(Self { source, clock, files })
     }
 
     /// The share that has been read, 0 to 1; `None` where nobody knows the whole.
     #[must_use]
     pub fn progress(&self) -> Option<f64> {
         let done = self.files.count - self.files.rest.len() - 1;
-        Some((done as f64 + self.reader.progress()?) / self.files.count as f64)
+        Some((done as f64 + self.source.progress()?) / self.files.count as f64)
     }
 
     /// The next frame; `None` at the end. Its bytes are borrowed: nothing is copied.
@@ -107,14 +136,14 @@ impl Capture {
     /// The next frame as the file has it, and as the diagnosis sees it.
     #[inline]
     pub fn next_captured(&mut self) -> Option<CaptureItem<'_>> {
-        while !self.reader.advance() {
-            self.reader = self.files.after(&self.reader)?;
+        while !self.source.advance() {
+            self.source = self.files.after(&self.source)?;
         }
-        let Self { reader, clock, files } = self;
-        if reader.interfaces().len() > files.numbers.len() {
-            files.describe(reader.interfaces());
+        let Self { source, clock, files } = self;
+        if source.interfaces().len() > files.numbers.len() {
+            files.describe(source.interfaces());
         }
-        let mut captured = reader.frame()?;
+        let mut captured = source.frame()?;
         captured.number = FrameNumber(captured.number.0 + files.frames_before);
         captured.interface = files.number(captured.interface);
         let at = clock.place(captured.interface, captured.time).at;
@@ -143,16 +172,23 @@ impl Capture {
     #[must_use]
     pub fn latest(&self) -> Instant {
         let last = self.clock.latest();
-        let ended = self.reader.interfaces().iter().filter_map(|interface| interface.ended);
+        let ended = self.source.interfaces().iter().filter_map(|interface| interface.ended);
         // Who says it recorded for days after the last frame has another clock.
         let is_sound = |at: &Instant| at.since(last) < LONGEST_SILENCE;
         ended.map(|time| self.clock.at(time)).filter(is_sound).fold(last, Instant::max)
     }
 
+    /// True if the recorder says until when it has recorded; known at the end. `tcpdump -w` does not: whether something came
+    /// after the last frame is unknown then.
+    #[must_use]
+    pub fn has_end_mark(&self) -> bool {
+        self.source.interfaces().iter().any(|interface| interface.ended.is_some())
+    }
+
     /// Frames that the recorder says it has lost: they are missing in the files, not on the line.
     #[must_use]
     pub fn missed(&self) -> u64 {
-        self.files.missed.saturating_add(missed(&self.reader))
+        self.files.missed.saturating_add(missed(&self.source))
     }
 
     /// How many frames were earlier than one before them, and by how much at most.
@@ -165,7 +201,7 @@ impl Capture {
     /// counts.
     #[must_use]
     pub fn end(&self) -> Option<&CaptureEnd> {
-        self.reader.end().map(|end| self.files.early.as_ref().unwrap_or(end))
+        self.source.end().map(|end| self.files.early.as_ref().unwrap_or(end))
     }
 
     /// A later file that could not be opened; it ended the capture.
@@ -183,14 +219,75 @@ impl Capture {
     /// Frames of the present file that were passed over because of their link type.
     #[must_use]
     pub fn skipped(&self) -> &[SkippedLinkType] {
-        self.reader.skipped()
+        self.source.skipped()
+    }
+}
+
+impl FrameSource {
+    /// A reader, in a thread of its own where it reads a file and the system gives one.
+    fn of(reader: CaptureReader, is_file: bool) -> Self {
+        if !is_file {
+            return Self::Direct(reader);
+        }
+        ReadAhead::start(reader).map_or_else(|reader| Self::Direct(*reader), Self::Ahead)
+    }
+
+    #[inline]
+    fn advance(&mut self) -> bool {
+        match self {
+            Self::Direct(reader) => reader.advance(),
+            Self::Ahead(reader) => reader.advance(),
+            Self::Merged(captures) => captures.advance(),
+        }
+    }
+
+    #[inline]
+    fn frame(&self) -> Option<CapturedFrame<'_>> {
+        match self {
+            Self::Direct(reader) => reader.frame(),
+            Self::Ahead(reader) => reader.frame(),
+            Self::Merged(captures) => captures.frame(),
+        }
+    }
+
+    #[inline]
+    fn interfaces(&self) -> &[CaptureInterface] {
+        match self {
+            Self::Direct(reader) => reader.interfaces(),
+            Self::Ahead(reader) => reader.interfaces(),
+            Self::Merged(captures) => captures.interfaces(),
+        }
+    }
+
+    fn skipped(&self) -> &[SkippedLinkType] {
+        match self {
+            Self::Direct(reader) => reader.skipped(),
+            Self::Ahead(reader) => reader.skipped(),
+            Self::Merged(captures) => captures.skipped(),
+        }
+    }
+
+    fn progress(&self) -> Option<f64> {
+        match self {
+            Self::Direct(reader) => reader.progress(),
+            Self::Ahead(reader) => reader.progress(),
+            Self::Merged(captures) => captures.progress(),
+        }
+    }
+
+    fn end(&self) -> Option<&CaptureEnd> {
+        match self {
+            Self::Direct(reader) => reader.end(),
+            Self::Ahead(reader) => reader.end(),
+            Self::Merged(captures) => captures.end(),
+        }
     }
 }
 
 impl RecordingFiles {
     /// Opens the file after one that has ended; `None` when it was the last.
     #[cold]
-    fn after(&mut self, ended: &CaptureReader) -> Option<CaptureReader> {
+    fn after(&mut self, ended: &FrameSource) -> Option<FrameSource> {
         let end = ended.end()?;
         if !end.complete() {
             self.early.get_or_insert_with(|| end.clone());
@@ -200,7 +297,7 @@ impl RecordingFiles {
         self.missed = self.missed.saturating_add(missed(ended));
         self.numbers.clear();
         match CaptureReader::open(next) {
-            Ok(reader) => Some(reader),
+            Ok(reader) => Some(FrameSource::of(reader, true)),
             Err(error) => {
                 self.fault = Some(error);
                 self.rest.clear();
@@ -237,8 +334,8 @@ impl RecordingFiles {
 }
 
 /// Frames that the recorder of a file says it has lost.
-fn missed(reader: &CaptureReader) -> u64 {
-    let told = reader.interfaces().iter().filter_map(|interface| interface.drops);
+fn missed(source: &FrameSource) -> u64 {
+    let told = source.interfaces().iter().filter_map(|interface| interface.drops);
     told.fold(0, u64::saturating_add)
 }
 

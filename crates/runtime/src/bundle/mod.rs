@@ -24,4 +24,4 @@ pub use manifest::{
 };
 pub use observation::{Noticed, ObservationLine};
 pub use recorder::{BundleRecorder, BundleSettings, RecordedEngine};
-pub use writer::{BundleNews, BundleReceiver};
+pub use writer::{BundleNews, BundleReceiver, BundleRework};

@@ -15,7 +15,7 @@ use linesman_session::DiagnosisInput;
 
 use super::history::{CHUNK_LASTS, FrameHistory, KeptNote};
 use super::manifest::{BundleExchange, BundleFinding, Manifest, SCHEMA, Trigger, findings};
-use super::writer::{BundleReceiver, BundleWriter, FolderLimits, Job};
+use super::writer::{BundleReceiver, BundleRework, BundleWriter, FolderLimits, Job};
 use crate::run::diagnosis_thread::DiagnosisObserver;
 
 /// Findings so long after the first begin another bundle.
@@ -44,6 +44,8 @@ pub struct BundleSettings {
     pub cards: Vec<String>,
     /// The report for people.
     pub report: fn(&Diagnosis, &Engine) -> String,
+    /// What is done to each bundle before it bears its name, such as taking out what tells whose machine it is.
+    pub rework: Option<BundleRework>,
 }
 
 /// A bundle to come.
@@ -70,7 +72,7 @@ impl BundleRecorder {
     /// When the folder cannot be made, or the system has no more threads.
     pub fn start(settings: BundleSettings) -> io::Result<(Self, BundleReceiver)> {
         let limits = FolderLimits { files: settings.files, bytes: settings.bytes };
-        let (writer, news) = BundleWriter::start(&settings.folder, limits)?;
+        let (writer, news) = BundleWriter::start(&settings.folder, limits, settings.rework)?;
         let history = FrameHistory::new(settings.memory, settings.before);
         Ok((Self { settings, history, writer, pending: None }, news))
     }

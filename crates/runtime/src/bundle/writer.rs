@@ -65,6 +65,9 @@ pub(super) struct Job {
     pub(super) found: UnixTime,
 }
 
+/// Reads the bundle at the first path, and writes at the second what is to bear its name; else why not.
+pub type BundleRework = fn(&Path, &Path) -> Result<(), String>;
+
 /// Limits of a folder of bundles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FolderLimits {
@@ -81,12 +84,16 @@ pub(super) struct BundleWriter {
 
 impl BundleWriter {
     /// Starts it.
-    pub(super) fn start(folder: &Path, limits: FolderLimits) -> io::Result<(Self, BundleReceiver)> {
+    pub(super) fn start(
+        folder: &Path,
+        limits: FolderLimits,
+        rework: Option<BundleRework>,
+    ) -> io::Result<(Self, BundleReceiver)> {
         fs::create_dir_all(folder)?;
         let (jobs, taken) = mpsc::sync_channel::<Box<Job>>(WAITING);
         let (news, told) = mpsc::sync_channel(NEWS);
-        let mut files =
-            Folder { folder: folder.to_owned(), limits, written: VecDeque::new(), number: 0 };
+        let (folder, written) = (folder.to_owned(), VecDeque::new());
+        let mut files = Folder { folder, limits, rework, written, number: 0 };
         let tell = news.clone();
         let thread = thread::Builder::new().name("bundles".to_owned()).spawn(move || {
             for job in taken {
@@ -127,6 +134,7 @@ impl Drop for BundleWriter {
 struct Folder {
     folder: PathBuf,
     limits: FolderLimits,
+    rework: Option<BundleRework>,
     /// Those that were written and are there, oldest first, with their lengths.
     written: VecDeque<(WatchedFile, u64)>,
     number: u64,
@@ -152,17 +160,27 @@ impl Folder {
     /// Writes under another name first: what bears the name of a bundle is whole.
     fn write(&mut self, job: &Job) -> Result<(PathBuf, u64), CaptureWriteError> {
         let path = self.free_name(job.found)?;
-        let part = path.with_extension("part");
-        let written = self.write_to(job, &part).and_then(|bytes| {
-            fs::hard_link(&part, &path)?;
-            Ok(bytes)
+        let (part, reworked) = (path.with_extension("part"), path.with_extension("reworked"));
+        let written = self.write_to(job, &part).and_then(|()| {
+            let ready = match self.rework {
+                Some(rework) => {
+                    rework(&part, &reworked).map_err(io::Error::other)?;
+                    &reworked
+                }
+                None => &part,
+            };
+            fs::hard_link(ready, &path)?;
+            Ok(fs::metadata(ready)?.len())
         });
-        // It is not needed any more, whatever became of it.
+        // They are not needed any more, whatever became of them.
         let _ = fs::remove_file(&part);
+        if self.rework.is_some() {
+            let _ = fs::remove_file(&reworked);
+        }
         written.map(|bytes| (path, bytes))
     }
 
-    fn write_to(&self, job: &Job, part: &Path) -> Result<u64, CaptureWriteError> {
+    fn write_to(&self, job: &Job, part: &Path) -> Result<(), CaptureWriteError> {
         let members = Members {
             manifest: job.manifest.clone(),
             project: job.project.clone(),
@@ -171,8 +189,7 @@ impl Folder {
         };
         let file = File::create_new(part)?;
         let frames = KeptFrames::of(&job.kept, job.start, &job.cards);
-        write(&file, members, &frames)?;
-        Ok(file.metadata()?.len())
+        write(&file, members, &frames)
     }
 
     /// The next name that is free.
