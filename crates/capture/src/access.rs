@@ -56,6 +56,8 @@ pub struct DatagramAccess<'a> {
     pub read: Option<&'a [u8]>,
     /// What SubDevices have added to its working counter; `None` where it did not come back.
     pub wkc: Option<u16>,
+    /// True if another copy of it came back before: in a ring each request goes out by both cards.
+    pub is_further_copy: bool,
     /// When it came back, or went out if it did not.
     pub at: Instant,
     /// The number of that frame.
@@ -75,7 +77,7 @@ impl<'a> DatagramAccess<'a> {
         part(self.written?, self.address, address, len)
     }
 
-    fn answered(answer: &Answer<'a>, counted: u16) -> Self {
+    fn answered(answer: &Answer<'a>, counted: u16, is_further_copy: bool) -> Self {
         let (effect, reply) = (answer.effect, answer.reply);
         let written = match (effect.writes, answer.request, effect.reads) {
             (false, _, _) | (true, None, true) => None,
@@ -94,6 +96,7 @@ impl<'a> DatagramAccess<'a> {
             written,
             read: (effect.reads && answer.own > 0).then(|| reply.data()),
             wkc: Some(answer.sum),
+            is_further_copy,
             at: answer.at,
             frame: answer.frame,
         }
@@ -129,8 +132,10 @@ pub fn accesses<'a>(
 ) {
     match (&exchange.request, &exchange.reply) {
         (request, Some(reply)) => {
+            let is_further = !exchange.earlier.is_empty();
             let all = answers(exchange, request.as_ref(), reply);
-            all.flatten().for_each(|answer| take(&DatagramAccess::answered(&answer, counted)));
+            all.flatten()
+                .for_each(|answer| take(&DatagramAccess::answered(&answer, counted, is_further)));
         }
         (Some(request), None) => lost(request, take),
         (None, None) => {}
@@ -152,6 +157,7 @@ fn lost<'a>(request: &FrameCopy<'a>, mut take: impl FnMut(&DatagramAccess<'a>)) 
             written: effect.writes.then(|| datagram.data()),
             read: None,
             wkc: None,
+            is_further_copy: false,
             at: request.time,
             frame: request.number,
         });

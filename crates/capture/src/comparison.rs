@@ -125,20 +125,24 @@ fn network(changes: &mut Changes, before: JudgedCapture<'_>, after: JudgedCaptur
 }
 
 fn devices(changes: &mut Changes, before: &CaptureReport, after: &CaptureReport) {
-    let by_no = |one: &CaptureReport| -> BTreeMap<u32, SurveyedDevice> {
-        one.devices.iter().map(|device| (device.about.no, device.clone())).collect()
-    };
-    let (one, other) = (by_no(before), by_no(after));
-    for (no, device) in &one {
-        match other.get(no) {
-            Some(now) => device_changes(changes, device, now),
+    let keys = |one: &CaptureReport| one.devices.iter().map(DeviceKey::of).collect::<Vec<_>>();
+    let pairs = pair(&keys(before), &keys(after));
+    let partner: BTreeMap<usize, usize> = pairs.iter().copied().collect();
+    for (index, device) in before.devices.iter().enumerate() {
+        match partner.get(&index) {
+            Some(other) => device_changes(changes, device, &after.devices[*other]),
             None => {
-                changes.push("SubDevice", Some(*no), (Some(called(device)), None), Tendency::Other)
+                let no = Some(device.about.no);
+                changes.push("SubDevice", no, (Some(called(device)), None), Tendency::Other);
             }
         }
     }
-    for (no, device) in other.iter().filter(|(no, _)| !one.contains_key(no)) {
-        changes.push("SubDevice", Some(*no), (None, Some(called(device))), Tendency::Other);
+    let known: BTreeSet<usize> = partner.values().copied().collect();
+    for (index, device) in after.devices.iter().enumerate() {
+        if !known.contains(&index) {
+            let no = Some(device.about.no);
+            changes.push("SubDevice", no, (None, Some(called(device))), Tendency::Other);
+        }
     }
     let rises = |one: &CaptureReport| -> BTreeMap<(u32, String), u64> {
         let counters = one.counters.iter().flat_map(|device| {
@@ -150,13 +154,78 @@ fn devices(changes: &mut Changes, before: &CaptureReport, after: &CaptureReport)
         });
         counters.collect()
     };
+    let now_called: BTreeMap<u32, u32> = pairs
+        .iter()
+        .map(|(one, other)| (before.devices[*one].about.no, after.devices[*other].about.no))
+        .collect();
     let (one, other) = (rises(before), rises(after));
     for ((no, name), rose) in &one {
+        let Some(now_no) = now_called.get(no) else { continue };
         // What was not read after the repair says nothing.
-        if let Some(now) = other.get(&(*no, name.clone())) {
+        if let Some(now) = other.get(&(*now_no, name.clone())) {
             changes.count(&format!("rise of {name}"), Some(*no), *rose, *now);
         }
     }
+}
+
+/// Facts by which a SubDevice is found again in another capture.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct DeviceKey {
+    no: u32,
+    vendor: Option<u32>,
+    product: Option<u32>,
+    /// The serial number; 0 is none.
+    serial: Option<u32>,
+}
+
+impl DeviceKey {
+    fn of(device: &SurveyedDevice) -> Self {
+        let about = &device.about;
+        Self {
+            no: about.no,
+            vendor: about.vendor_id,
+            product: about.product_code,
+            serial: about.serial.filter(|serial| *serial != 0),
+        }
+    }
+
+    /// True if nothing that both captures have read tells them apart.
+    fn may_be(&self, other: &Self) -> bool {
+        let agree = |one: Option<u32>, other: Option<u32>| {
+            one.zip(other).is_none_or(|(one, other)| one == other)
+        };
+        agree(self.vendor, other.vendor)
+            && agree(self.product, other.product)
+            && agree(self.serial, other.serial)
+    }
+
+    /// Identity by which it is known wherever it is.
+    fn unique(&self) -> Option<(Option<u32>, Option<u32>, u32)> {
+        self.serial.map(|serial| (self.vendor, self.product, serial))
+    }
+}
+
+/// Which SubDevices of two captures are the same, by their indexes: those whose number stayed and whose identity may have,
+/// then those whose identity with serial number is found elsewhere, then those of one number, of which one was
+/// exchanged. Station addresses do not count: another MainDevice gives others.
+fn pair(before: &[DeviceKey], after: &[DeviceKey]) -> Vec<(usize, usize)> {
+    let numbered = after.iter().enumerate();
+    let by_no: BTreeMap<u32, usize> = numbered.clone().map(|(at, key)| (key.no, at)).collect();
+    let unique = numbered.rev().filter_map(|(at, key)| Some((key.unique()?, at)));
+    let by_identity: BTreeMap<_, usize> = unique.collect();
+    let of_no = |one: &DeviceKey| by_no.get(&one.no).copied();
+    let (mut found, mut taken) = (vec![None; before.len()], vec![false; after.len()]);
+    let mut step = |find: &dyn Fn(&DeviceKey) -> Option<usize>| {
+        for (one, found) in before.iter().zip(&mut found).filter(|(_, found)| found.is_none()) {
+            *found = find(one).filter(|other| !taken[*other]);
+            found.iter().for_each(|other: &usize| taken[*other] = true);
+        }
+    };
+    step(&|one| of_no(one).filter(|other| one.may_be(&after[*other])));
+    step(&|one| by_identity.get(&one.unique()?).copied());
+    step(&of_no);
+    let indexed = found.into_iter().enumerate();
+    indexed.filter_map(|(index, other)| Some((index, other?))).collect()
 }
 
 /// Name of a SubDevice that only one capture has.
@@ -176,6 +245,7 @@ fn device_changes(changes: &mut Changes, before: &SurveyedDevice, after: &Survey
         }
     };
     let other_way = Tendency::Other;
+    both("number", (Some(one.no.to_string()), Some(other.no.to_string())), other_way);
     both("vendor", (number(one.vendor_id), number(other.vendor_id)), other_way);
     both("product", (number(one.product_code), number(other.product_code)), other_way);
     both("revision", (number(one.revision), number(other.revision)), other_way);
@@ -253,5 +323,46 @@ fn findings(changes: &mut Changes, before: &Diagnosis, after: &Diagnosis) {
             changes.push("finding", None, (None, text(new)), Tendency::Worse);
             changes.0.last_mut().into_iter().for_each(|one| one.place = Some(new.place.clone()));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn key(no: u32, product: u32, serial: u32) -> DeviceKey {
+        let serial = Some(serial).filter(|serial| *serial != 0);
+        DeviceKey { no, vendor: Some(2), product: Some(product), serial }
+    }
+
+    #[test]
+    fn subdevices_behind_one_that_was_put_in_are_found_by_their_serial_numbers() {
+        let before = [key(1, 1100, 11), key(2, 1008, 12), key(3, 2008, 13)];
+        let after = [key(1, 1100, 11), key(2, 3104, 99), key(3, 1008, 12), key(4, 2008, 13)];
+        assert_eq!(pair(&before, &after), [(0, 0), (1, 2), (2, 3)]);
+    }
+
+    #[test]
+    fn exchanged_one_is_compared_with_the_one_that_was_in_its_place() {
+        let before = [key(1, 1100, 11), key(2, 1008, 12)];
+        let after = [key(1, 1100, 11), key(2, 1008, 77)];
+        assert_eq!(pair(&before, &after), [(0, 0), (1, 1)]);
+        let other_type = [key(1, 1100, 11), key(2, 2008, 0)];
+        assert_eq!(pair(&before, &other_type), [(0, 0), (1, 1)]);
+    }
+
+    #[test]
+    fn equal_ones_without_serial_numbers_stay_with_their_numbers() {
+        let line = [key(1, 1100, 0), key(2, 1008, 0), key(3, 1008, 0)];
+        assert_eq!(pair(&line, &line[..2]), [(0, 0), (1, 1)]);
+        let unknown = DeviceKey { no: 2, vendor: None, product: None, serial: None };
+        assert_eq!(pair(&line, &[line[0], unknown]), [(0, 0), (1, 1)]);
+    }
+
+    #[test]
+    fn two_that_changed_places_are_told_by_their_serial_numbers() {
+        let before = [key(1, 1008, 5), key(2, 1008, 6)];
+        let after = [key(1, 1008, 6), key(2, 1008, 5)];
+        assert_eq!(pair(&before, &after), [(0, 1), (1, 0)]);
     }
 }

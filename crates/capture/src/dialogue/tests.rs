@@ -35,6 +35,7 @@ impl Bench {
             written: is_request.then_some(data),
             read: (!is_request && wkc > 0).then_some(data),
             wkc: Some(wkc),
+            is_further_copy: false,
             at: Instant::from_nanos(self.frame * 1_000),
             frame: self.frame,
         };

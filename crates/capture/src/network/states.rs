@@ -13,6 +13,8 @@ use crate::access::{DatagramAccess, DatagramTarget};
 const AL_CONTROL: u16 = 0x0120;
 const AL_STATUS: u16 = 0x0130;
 const AL_STATUS_CODE: u16 = 0x0134;
+/// So many entries back the other copy of a request is looked for.
+const COPIES_APART: usize = 64;
 /// Most entries that are kept.
 const MOST: usize = 20_000;
 
@@ -84,7 +86,10 @@ impl StateLog {
             return;
         }
         if let Some([control]) = access.written_at(AL_CONTROL, 1) {
-            self.push(access, StateEvent::Asked, u16::from(*control));
+            let value = u16::from(*control);
+            if !(access.is_further_copy && self.add_copy(access, value)) {
+                self.push(access, StateEvent::Asked, value);
+            }
         }
         if access.address.0 > AL_STATUS_CODE || access.effect.multiple_write {
             return;
@@ -106,6 +111,21 @@ impl StateLog {
             self.push(access, StateEvent::Code, code);
             self.last.entry(access.target).or_default().1 = Some(code);
         }
+    }
+
+    /// Adds another copy of a request to the entry of the first one; `false` where there is none.
+    fn add_copy(&mut self, access: &DatagramAccess<'_>, value: u16) -> bool {
+        let mut latest = self.entries.iter_mut().rev().take(COPIES_APART);
+        let is_it = |entry: &&mut StateEntry| {
+            (entry.what, entry.value, entry.target) == (StateEvent::Asked, value, access.target)
+        };
+        let Some(entry) = latest.find(is_it) else { return false };
+        // The sum of all copies so far.
+        if access.wkc > entry.wkc {
+            entry.wkc = access.wkc;
+            (entry.at, entry.frame) = (access.at.as_nanos(), access.frame);
+        }
+        true
     }
 
     fn push(&mut self, access: &DatagramAccess<'_>, what: StateEvent, value: u16) {
