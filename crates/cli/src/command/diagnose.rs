@@ -10,7 +10,7 @@ mod observations;
 mod probe_recording;
 mod questions;
 mod recordings;
-mod ring;
+pub(crate) mod ring;
 mod segment;
 pub(crate) mod several;
 
@@ -70,6 +70,10 @@ pub(crate) struct Arguments {
     /// Judge the files of a ring (trace_00001_….pcapng, trace_00002_….pcapng) each for itself, not as one recording
     #[arg(long)]
     separate: bool,
+    /// Judge files that were recorded at the same time as one recording, by the times of their frames: those of the two
+    /// cards of a ring, or of the two ways of a tap
+    #[arg(long, conflicts_with = "separate")]
+    together: bool,
     /// Tell findings as they open and close; with --json one linesman.event/1 per line
     #[arg(long)]
     follow: bool,
@@ -161,7 +165,7 @@ impl From<Target> for AlState {
 
 /// Judges what the selector names.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    if !arguments.separate && ring::is_ring(&arguments.places) {
+    if arguments.together || !arguments.separate && ring::is_ring(&arguments.places) {
         return ring::run(arguments, output);
     }
     let [place] = arguments.places.as_slice() else {

@@ -168,6 +168,24 @@ fn bundle_of_planned_line_loses_the_names_of_its_project() {
 }
 
 #[test]
+fn bundles_are_anonymised_as_they_are_written_and_the_same_is_found() {
+    let folder = TempDir::new().unwrap();
+    let plain = recorded(&folder, 2, &[]);
+    let other = TempDir::new().unwrap();
+    let hidden = recorded(&other, 2, &["--bundle-anonymise"]);
+    assert_eq!(hidden.len(), plain.len());
+    for (plain, hidden) in plain.iter().zip(&hidden) {
+        assert_eq!(found(&judged(plain)), found(&judged(hidden)));
+        for (name, bytes) in members(hidden) {
+            assert!(!contains(&bytes, SECRET.as_bytes()), "{name} names the customer");
+            assert!(!contains(&bytes, &SERIAL.to_le_bytes()), "{name} has a serial number");
+        }
+    }
+    let left: Vec<_> = fs::read_dir(other.path().join("bundles")).unwrap().collect();
+    assert_eq!(left.len(), hidden.len(), "nothing else stays in the folder");
+}
+
+#[test]
 fn findings_far_apart_are_found_again_though_frames_between_are_left_out() {
     let folder = TempDir::new().unwrap();
     let narrow = ["--bundle-memory", "4", "--bundle-before", "2s", "--bundle-after", "1s"];

@@ -61,6 +61,30 @@ fn recording_ends_after_the_first_finding_and_holds_what_led_to_it() {
     assert!(findings.iter().any(|finding| finding["cause"] == "link-open"), "{verdict:#}");
 }
 
+// proves: WS-12 (V) partial: the end by a condition
+#[test]
+fn recording_ends_after_the_first_frame_that_meets_a_condition_and_holds_the_chosen_frames() {
+    let script = r#"
+        "$LINESMAN" capture record near0 -o "$DIRECTORY/met.pcapng" --until 'ecat.cmd == "LRW" && wkc.wrong' \
+            --after 300ms --only 'cyclic' --for 30s > "$DIRECTORY/told" & record=$!
+        sleep 1.5
+        "$LINESMAN" fault "$DIRECTORY/control" inject link-open --at I1.B-O1.A > /dev/null || exit 8
+        wait $record; echo "status $?"
+        cat "$DIRECTORY/told"
+        kill -TERM $run; wait $run
+        "$LINESMAN" capture filter "$DIRECTORY"/met_*.pcapng '!cyclic'
+        "$LINESMAN" capture filter "$DIRECTORY"/met_*.pcapng 'ecat.cnt == 0'
+    "#;
+    let Some(run) = beside_segment(&format!("{DRIVING}{script}")) else { return };
+    assert!(run.stdout.contains("status 1"), "{}", run.all());
+    assert!(run.stdout.contains("the recording ends 300"), "{}", run.all());
+    let met: Vec<&str> = run.stdout.lines().filter(|line| line.contains("meet")).collect();
+    assert!(
+        met.iter().any(|line| line.starts_with("0 of")),
+        "frames without process data: {met:?}"
+    );
+}
+
 #[test]
 fn what_cannot_be_recorded_is_refused_before_anything_is_heard() {
     for (arguments, words) in [
@@ -70,6 +94,15 @@ fn what_cannot_be_recorded_is_refused_before_anything_is_heard() {
         (["eth0", "-o", "trace.pcap"], "end in .pcapng"),
     ] {
         let run = linesman([&["capture", "record"], &arguments[..]].concat());
+        assert_eq!(run.status, 2, "{}", run.all());
+        assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
+    }
+    for (condition, words) in [
+        (["--until", "ecat.cnt = (3"], "--until, column"),
+        (["--only", "subdevice == \"K1\""], "known at the end alone"),
+    ] {
+        let run =
+            linesman([&["capture", "record", "lo", "-o", "t.pcapng"], &condition[..]].concat());
         assert_eq!(run.status, 2, "{}", run.all());
         assert!(run.stderr.contains(words), "{words}: {}", run.stderr);
     }

@@ -21,6 +21,7 @@ mod capture_info;
 mod capture_probe;
 mod capture_record;
 mod capture_returns;
+mod capture_together;
 mod captures;
 mod clocks;
 mod counters;

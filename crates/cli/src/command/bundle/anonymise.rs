@@ -1,14 +1,16 @@
 //! `linesman bundle anonymise`: a bundle that can be given to a maker without naming the customer.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use linesman_capture::anonymous::FrameAnonymiser;
 use linesman_config::attachment::Attachment;
 use linesman_config::project::{Project, ProjectDevice};
 use linesman_diagnosis::report::Number;
 use linesman_diagnosis::{Diagnosis, Engine};
-use linesman_runtime::bundle::{Anonymised, Bundle, differences, findings};
+use linesman_runtime::bundle::{
+    Anonymised, Bundle, BundleFinding, Manifest, differences, findings,
+};
 
 use super::recording::report;
 use super::{findings_in_words, open};
@@ -43,38 +45,56 @@ pub(super) struct Arguments {
 /// Writes the other one.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     files::refuse_to_overwrite(&arguments.output)?;
-    let mut bundle = open(&arguments.bundle)?;
-    let before = judged(&bundle)?.0;
-    anonymise(&mut bundle)?;
-    let (diagnosis, report) = judged(&bundle)?;
-    let (missing, new) = {
-        let (first, second) = (findings(&before), findings(&diagnosis));
-        let (missing, new) = differences(&first, &second);
-        let owned = |all: Vec<&_>| all.into_iter().cloned().collect::<Vec<_>>();
-        (owned(missing), owned(new))
-    };
-    bundle.diagnosis = Some(diagnosis);
-    bundle
-        .write(&arguments.output, &report)
-        .map_err(|error| files::in_file(&arguments.output, &error))?;
+    let written = write_anonymised(&arguments.bundle, &arguments.output)?;
+    let manifest = &written.manifest;
     if arguments.json {
-        output.json(&bundle.manifest);
+        output.json(manifest);
     } else {
-        let told = bundle.manifest.anonymised.as_ref().map(told).unwrap_or_default();
+        let told = manifest.anonymised.as_ref().map(told).unwrap_or_default();
         output.line(&format!("{}: replaced {told}.", arguments.output.display()));
     }
-    for (which, what) in
-        [(&missing, "not found in it any more"), (&new, "found in it and not before")]
-    {
+    for (which, what) in [
+        (&written.missing, "not found in it any more"),
+        (&written.new, "found in it and not before"),
+    ] {
         if !which.is_empty() {
             output.warn(&format!("{what}: {}", findings_in_words(which)));
         }
     }
-    let is_same = missing.is_empty() && new.is_empty();
+    let is_same = written.missing.is_empty() && written.new.is_empty();
     if is_same && !arguments.json {
         output.line("The same is found in it: codes, places and causes.");
     }
     Ok(if is_same { Status::Good } else { Status::Findings })
+}
+
+/// A bundle that was written without what tells whose machine it is.
+struct AnonymisedBundle {
+    manifest: Manifest,
+    /// Findings of the first one that are not found in it.
+    missing: Vec<BundleFinding>,
+    /// Findings that are found in it alone.
+    new: Vec<BundleFinding>,
+}
+
+/// Reads a bundle, and writes it anonymised.
+fn write_anonymised(from: &Path, to: &Path) -> Result<AnonymisedBundle, Failure> {
+    let mut bundle = open(from)?;
+    let before = judged(&bundle)?.0;
+    anonymise(&mut bundle)?;
+    let (diagnosis, report) = judged(&bundle)?;
+    let (first, second) = (findings(&before), findings(&diagnosis));
+    let (missing, new) = differences(&first, &second);
+    let owned = |all: Vec<&BundleFinding>| all.into_iter().cloned().collect::<Vec<_>>();
+    let (missing, new) = (owned(missing), owned(new));
+    bundle.diagnosis = Some(diagnosis);
+    bundle.write(to, &report).map_err(|error| files::in_file(to, &error))?;
+    Ok(AnonymisedBundle { manifest: bundle.manifest, missing, new })
+}
+
+/// The same for a bundle that is being written beside a run.
+pub(super) fn anonymise_file(from: &Path, to: &Path) -> Result<(), String> {
+    write_anonymised(from, to).map(drop).map_err(|failure| failure.reason)
 }
 
 /// Counts of what was replaced, in words.

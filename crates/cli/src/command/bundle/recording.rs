@@ -8,6 +8,7 @@ use linesman_link::unix_time::UnixTime;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::bundle::{BundleNews, BundleReceiver, BundleRecorder, BundleSettings};
 
+use super::anonymise::anonymise_file;
 use super::findings_in_words;
 use crate::amount::{SECOND, count, duration};
 use crate::command::diagnose::{NO_CLOCK, names};
@@ -44,6 +45,10 @@ pub(crate) struct BundleArguments {
     /// Keep so many bundles of this run: the oldest are removed, and that is said
     #[arg(long, value_name = "COUNT", default_value = "20", requires = "bundles", value_parser = count(1, 99_999))]
     bundle_keep: u64,
+    /// Write them as `linesman bundle anonymise` does: without names, serial numbers, process data and addresses of network
+    /// cards
+    #[arg(long, requires = "bundles")]
+    bundle_anonymise: bool,
     /// Keep so many megabytes of them
     #[arg(long, value_name = "MEGABYTES", default_value = "1000", requires = "bundles",
           value_parser = count(1, 1_000_000))]
@@ -70,6 +75,7 @@ impl BundleArguments {
             start,
             cards: cards.to_vec(),
             report,
+            rework: self.bundle_anonymise.then_some(anonymise_file),
         };
         BundleRecorder::start(settings).map(Some).map_err(|error| {
             let reason = format!("{}: a folder for bundles: {error}", folder.display());

@@ -29,8 +29,9 @@ pub(crate) struct Arguments {
 /// Compares them.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
-    let before = survey(&arguments.before, None, &stop, output)?;
-    let after = survey(&arguments.after, None, &stop, output)?;
+    let one = std::slice::from_ref::<String>;
+    let before = survey(one(&arguments.before), false, None, &stop, output)?;
+    let after = survey(one(&arguments.after), false, None, &stop, output)?;
     let diagnosis = |one: &Surveyed| one.engine.diagnosis();
     let found = compare((&before.report, &diagnosis(&before)), (&after.report, &diagnosis(&after)));
     let status = if found.changes.is_empty() { Status::Good } else { Status::Findings };

@@ -14,9 +14,13 @@ use crate::text::capture;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// The capture
-    #[arg(value_name = "FILE")]
-    place: String,
+    /// The capture; several are the files of a ring of files, or with --together files of the same time
+    #[arg(value_name = "FILE", required = true)]
+    places: Vec<String>,
+    /// The files were recorded at the same time, as at the two cards of a ring or on the two ways of a tap: their frames
+    /// are put in the order of their times
+    #[arg(long)]
+    together: bool,
     /// Device descriptions of makers (ESI) that name the types of SubDevices: a folder of XML files, or one
     #[arg(long, value_name = "FOLDER|FILE.xml")]
     esi: Option<PathBuf>,
@@ -31,7 +35,8 @@ pub(crate) struct Arguments {
 /// Tells what the network is. That judges nothing: the exit status is 0 once EtherCAT frames were found.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
-    let surveyed = survey(&arguments.place, arguments.esi.as_deref(), &stop, output)?;
+    let surveyed =
+        survey(&arguments.places, arguments.together, arguments.esi.as_deref(), &stop, output)?;
     if arguments.json {
         output.json(&surveyed.report);
         return Ok(Status::Good);

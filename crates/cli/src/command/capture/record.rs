@@ -1,5 +1,7 @@
 //! `linesman capture record`: what passes a card, in a ring of files, until something is wrong.
 
+mod condition;
+
 use std::path::{Path, PathBuf};
 
 use linesman_capture::masking::mask_process_data;
@@ -22,6 +24,7 @@ use crate::failure::Failure;
 use crate::output::{Output, Progress};
 use crate::text::quantity::{count, time};
 use crate::version;
+use condition::RecordConditions;
 
 /// Longest wait, so that a wish to stop is noticed.
 const NAP: Span = Span::ms(100);
@@ -33,7 +36,9 @@ const MEGABYTE: u64 = 1_000_000;
 #[command(
     after_help = "It listens and never sends, beside whatever MainDevice. The files are named as those of dumpcap, \
                   trace_00001_20260301101650.pcapng and on; all of them are one recording: `linesman diagnose \
-                  trace_*.pcapng`.\n\nExit status: 0 recorded, 1 ended by a finding, 2 nothing was heard, or an error."
+                  trace_*.pcapng`.\n\nConditions are those of `linesman capture filter`, but for SubDevices by name and times \
+                  around findings: those are known at the end alone.\n\nExit status: 0 recorded, 1 ended by a finding or a \
+                  condition, 2 nothing was heard, or an error."
 )]
 pub(super) struct Arguments {
     /// The card that frames pass: eth0, or eth0+eth1 at the ends of a ring
@@ -59,6 +64,16 @@ pub(super) struct Arguments {
     /// before and after it
     #[arg(long, value_name = "TIME", num_args = 0..=1, default_missing_value = "10s", value_parser = lasting())]
     until_finding: Option<Span>,
+    /// End after the first frame that meets a condition, such as 'ecat.cmd == "LRW" && wkc.wrong', so that the files
+    /// hold what came before and after it
+    #[arg(long, value_name = "CONDITION", conflicts_with = "until_finding")]
+    until: Option<String>,
+    /// Record so long after that frame
+    #[arg(long, value_name = "TIME", default_value = "10s", requires = "until", value_parser = lasting())]
+    after: Span,
+    /// Write only the frames that meet a condition
+    #[arg(long, value_name = "CONDITION")]
+    only: Option<String>,
     /// Write process data as zeros; addresses and working counters stay
     #[arg(long)]
     mask: bool,
@@ -70,6 +85,11 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     check(&arguments.output)?;
     let stop = line_access::stop()?;
     let clock = HostClock::start();
+    let conditions = RecordConditions::parse(
+        arguments.only.as_deref(),
+        arguments.until.as_deref(),
+        clock.started_at(),
+    )?;
     let mut card_listener = CardListener::open(&cards, clock)?;
     let limits = RingLimits {
         bytes: arguments.size * MEGABYTE,
@@ -82,11 +102,15 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         ring,
         clock,
         engine: None,
+        conditions,
         after: arguments.until_finding,
+        after_awaited: arguments.after,
+        awaited: None,
         masked: arguments.mask.then(Vec::new),
         until: arguments.lasts.map_or(Instant::MAX, |lasts| clock.now() + lasts),
         finding: None,
         frames: 0,
+        left_out: 0,
         missed: 0,
         unmasked: 0,
     };
@@ -102,6 +126,7 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             break;
         }
         recording.tell_finding(&mut progress, output);
+        recording.tell_awaited(&mut progress, output);
         let frames = recording.frames;
         progress.show(|| format!("{}, {}", count(frames, "frame"), time(clock.now().as_nanos())));
     }
@@ -145,6 +170,12 @@ fn check(path: &Path) -> Result<(), Failure> {
 struct RingRecording {
     ring: RingRecorder,
     clock: HostClock,
+    /// Which frames are written, and which one ends the recording.
+    conditions: RecordConditions,
+    /// Time that is recorded after that one.
+    after_awaited: Span,
+    /// When it came, and whether that was told.
+    awaited: Option<(Instant, bool)>,
     /// Judges the line, where a finding ends the recording; from the first frame on.
     engine: Option<Engine>,
     /// Time that is recorded after the first finding.
@@ -154,6 +185,8 @@ struct RingRecording {
     until: Instant,
     finding: Option<FindingReport>,
     frames: u64,
+    /// Frames that met no condition, and were not written.
+    left_out: u64,
     /// Frames for which the socket had no room.
     missed: u64,
     /// Frames that could not be taken apart, and were left out of a masked recording.
@@ -192,6 +225,15 @@ impl RingRecording {
         if self.after.is_some() {
             self.engine.get_or_insert_with(|| begin(self.clock)).handle_frame(frame);
         }
+        let decision = self.conditions.judge(frame);
+        if decision.is_awaited && self.awaited.is_none() {
+            self.awaited = Some((frame.time, false));
+            self.until = self.until.min(frame.time + self.after_awaited);
+        }
+        if !decision.is_written {
+            self.left_out += 1;
+            return;
+        }
         let Some(room) = &mut self.masked else { return self.ring.frame(frame) };
         room.clear();
         room.extend_from_slice(frame.bytes);
@@ -222,6 +264,17 @@ impl RingRecording {
             ));
             self.finding = Some(event.finding);
         }
+    }
+
+    /// Says that the frame has come that was waited for, and when the recording ends for it.
+    fn tell_awaited(&mut self, progress: &mut Progress, output: &mut Output) {
+        let Some((at, is_told @ false)) = &mut self.awaited else { return };
+        *is_told = true;
+        let (at, after) = (time(at.as_nanos()), time(self.after_awaited.as_nanos()));
+        progress.clear();
+        output.line(&format!(
+            "the condition of --until was met at {at}; the recording ends {after} later"
+        ));
     }
 
     fn conclude(
@@ -258,6 +311,15 @@ impl RingRecording {
             let advice = "check that the MainDevice runs, and that its line passes this card";
             return Err(Failure::new(reason, advice));
         }
+        let frames = self.frames - self.left_out;
+        if frames == 0 {
+            let reason = format!(
+                "none of {} meets the condition of --only, and no file was written",
+                count(self.frames, "frame")
+            );
+            let advice = "try it on a recording: `linesman capture filter trace.pcapng CONDITION`";
+            return Err(Failure::new(reason, advice));
+        }
         for file in &files {
             output.line(&file.display().to_string());
         }
@@ -267,10 +329,14 @@ impl RingRecording {
         };
         output.line(&format!(
             "{} in {}{older}; judge them together: `linesman diagnose` with all of these names",
-            count(self.frames, "frame"),
+            count(frames, "frame"),
             count(files.len() as u64 + removed, "file"),
         ));
-        Ok(if self.finding.is_some() { Status::Findings } else { Status::Good })
+        Ok(if self.finding.is_some() || self.awaited.is_some() {
+            Status::Findings
+        } else {
+            Status::Good
+        })
     }
 }
 

@@ -1,7 +1,8 @@
 //! A capture, read from its first frame to its last: diagnosis and survey.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+use linesman_capture::network::unknown::UnknownReport;
 use linesman_capture::{CaptureReport, Survey};
 use linesman_diagnosis::{Engine, Setup};
 use linesman_link::capture::CaptureError;
@@ -14,10 +15,11 @@ use linesman_runtime::stop::Stop;
 
 use crate::command::bundle::frames;
 use crate::command::diagnose::capture::{nothing_seen, read};
-use crate::command::diagnose::names;
+use crate::command::diagnose::{names, ring};
 use crate::failure::Failure;
 use crate::output::Output;
 use crate::text::names::Names;
+use crate::text::quantity::count;
 use crate::version;
 
 /// A capture that was read.
@@ -30,17 +32,22 @@ pub(super) struct Surveyed {
     pub(super) names: Names,
 }
 
-/// Reads a capture. `esi` is where device descriptions are that name types.
+/// Reads a capture; several files are one recording, `together` those of the same time. `esi` is where device descriptions are that name types.
 pub(super) fn survey(
-    place: &str,
+    places: &[String],
+    together: bool,
     esi: Option<&Path>,
     stop: &Stop,
     output: &mut Output,
 ) -> Result<Surveyed, Failure> {
     let library = esi.map(library).transpose()?;
-    let input = open(place, stop)?;
-    let path = input.name().to_owned();
-    let mut capture = Capture::of(input)?;
+    let (path, mut capture) = match places {
+        [place] => {
+            let input = open(place, stop)?;
+            (input.name().to_owned(), Capture::of(input)?)
+        }
+        several => (PathBuf::from(several.join(" + ")), open_several(several, together)?),
+    };
     let setup = Setup {
         source: format!("capture:{}", path.display()),
         clock: "capture".to_owned(),
@@ -65,6 +72,9 @@ pub(super) fn survey(
         one.name.clone().or_else(|| one.description.clone()).unwrap_or_else(|| no.to_string())
     };
     report.recording.interfaces = interfaces.map(name).collect();
+    if !capture.has_end_mark() {
+        report.unknown.push(no_end_mark());
+    }
     if let Some(library) = &library {
         describe(&mut report, library);
     }
@@ -73,6 +83,32 @@ pub(super) fn survey(
         None => names(&engine),
     };
     Ok(Surveyed { report, engine, names })
+}
+
+/// What a recording without a note of its end leaves open.
+fn no_end_mark() -> UnknownReport {
+    UnknownReport {
+        what: "whether anything came after the last frame".to_owned(),
+        why: "the recorder did not note when it ended (`tcpdump -w` never does): a last request without an answer is not \
+              counted as lost; dumpcap, `capture record` and --record note it"
+            .to_owned(),
+        devices: Vec::new(),
+    }
+}
+
+/// The files of one recording.
+fn open_several(places: &[String], together: bool) -> Result<Capture, Failure> {
+    let paths: Vec<PathBuf> = places.iter().map(PathBuf::from).collect();
+    if together {
+        return Ok(Capture::side_by_side(&paths)?);
+    }
+    if !ring::is_ring(places) {
+        let files = count(places.len() as u64, "file");
+        let reason = format!("{files} whose names are not those of one ring of files");
+        let advice = "name one; or add --together where they were recorded at the same time";
+        return Err(Failure::new(reason, advice));
+    }
+    Ok(Capture::of_files(&paths)?)
 }
 
 fn open(place: &str, stop: &Stop) -> Result<Input, Failure> {

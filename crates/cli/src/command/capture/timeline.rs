@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         files::refuse_to_overwrite(path)?;
     }
     let stop = line_access::stop()?;
-    let surveyed = survey(&arguments.place, None, &stop, output)?;
+    let surveyed = survey(std::slice::from_ref(&arguments.place), false, None, &stop, output)?;
     let mut told = timeline(&surveyed.report, &surveyed.engine.diagnosis());
     if arguments.trouble {
         told.events.retain(|event| event.trouble);

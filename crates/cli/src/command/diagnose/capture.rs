@@ -30,9 +30,10 @@ pub(super) fn judge(
     judge_frames(&path, Capture::of(input)?, stop, session, output)
 }
 
-/// Judges the files of one recording as one capture.
-pub(super) fn judge_ring(
+/// Judges the files of one recording as one capture; `together` are files that were recorded side by side.
+pub(super) fn judge_files(
     paths: &[PathBuf],
+    together: bool,
     stop: &Stop,
     session: &mut DiagnosisRun,
     output: &mut Output,
@@ -40,7 +41,11 @@ pub(super) fn judge_ring(
     let all: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     let label = all.join(" + ");
     session.setup.source = format!("capture:{label}");
-    judge_frames(Path::new(&label), Capture::of_files(paths)?, stop, session, output)
+    let capture = match together {
+        true => Capture::side_by_side(paths)?,
+        false => Capture::of_files(paths)?,
+    };
+    judge_frames(Path::new(&label), capture, stop, session, output)
 }
 
 fn judge_frames(

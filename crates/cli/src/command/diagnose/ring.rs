@@ -1,4 +1,5 @@
-//! Capture files of one ring, as dumpcap and tcpdump write them, judged as one recording.
+//! Capture files that are one recording: those of a ring of files, as dumpcap and tcpdump write them, and those that were
+//! recorded side by side, as at both cards of a ring.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,7 @@ use crate::output::Output;
 
 /// True if the names are those of files of one ring: alike but for a number (`trace_00001_20260301101650.pcapng` by
 /// dumpcap, `trace.pcap1` by tcpdump), each another one.
-pub(super) fn is_ring(places: &[String]) -> bool {
+pub(crate) fn is_ring(places: &[String]) -> bool {
     let mut stems = places.iter().map(|place| stem(place));
     let Some(Some(first)) = stems.next() else { return false };
     let mut sorted: Vec<&String> = places.iter().collect();
@@ -48,6 +49,10 @@ fn stem(place: &str) -> Option<String> {
 /// Judges the files as one capture.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let paths: Vec<PathBuf> = arguments.places.iter().map(PathBuf::from).collect();
+    if let Some(place) = arguments.places.iter().find(|place| !Path::new(place).is_file()) {
+        let reason = format!("{place}: this is no file, and --together takes capture files");
+        return Err(Failure::new(reason, "name the files that were recorded at the same time"));
+    }
     let selector = Selector::File(paths[0].clone());
     refuse_misplaced(arguments, &selector)?;
     for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
@@ -57,7 +62,7 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let earlier = arguments.after.as_deref().map(earlier_look).transpose()?;
     let stop = line_access::stop()?;
     let mut session = DiagnosisRun::new(arguments, &selector, project, earlier);
-    let judged = capture::judge_ring(&paths, &stop, &mut session, output)?;
+    let judged = capture::judge_files(&paths, arguments.together, &stop, &mut session, output)?;
     Ok(session.answer(&judged.engine, &judged.names, judged.at, output))
 }
 

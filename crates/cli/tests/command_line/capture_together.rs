@@ -1,0 +1,104 @@
+//! Files that were recorded at the same time, as at the two cards of a ring, taken as one recording.
+
+use std::path::{Path, PathBuf};
+
+use crate::support::linesman;
+
+const RING: &str = r#"
+name = "ring"
+seed = 1
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "I1"
+type = "EL1008"
+on = "K1.B"
+[[device]]
+name = "O1"
+type = "EL2008"
+on = "I1.B"
+[[device]]
+name = "X1"
+type = "EK1110"
+on = "O1.B"
+[ring]
+closes_at = "X1.B"
+"#;
+
+/// A recording of the ring by both cards, and what each of them has seen in a file of its own.
+fn recorded(folder: &Path, faults: &str) -> (String, [String; 2]) {
+    let segment = folder.join("ring.toml");
+    std::fs::write(&segment, format!("{RING}{faults}")).unwrap();
+    let both = folder.join("both.pcapng").display().to_string();
+    let place = format!("sim:{}", segment.display());
+    let run = linesman(["diagnose", &place, "--seconds", "3", "--record", &both]);
+    assert!(run.status <= 1, "{}", run.all());
+    let cards = ["a", "b"].map(|card| {
+        let path: PathBuf = folder.join(format!("card-{card}.pcapng"));
+        let path = path.display().to_string();
+        let number = if card == "a" { "0" } else { "1" };
+        let condition = format!("frame.interface_id == {number}");
+        let run = linesman(["capture", "filter", &both, &condition, "-o", &path]);
+        assert_eq!(run.status, 0, "{}", run.all());
+        path
+    });
+    (both, cards)
+}
+
+#[test]
+fn captures_of_both_cards_of_a_ring_are_judged_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"I1.B-O1.A\"\nfrom_ms = 1500\n";
+    let (both, [a, b]) = recorded(folder.path(), cut);
+    let found = |arguments: &[&str]| {
+        let run = linesman([&["diagnose", "--json"], arguments].concat());
+        assert_eq!(run.status, 1, "{}", run.all());
+        let judged = run.json();
+        let findings = judged["findings"].as_array().unwrap().clone();
+        findings
+            .iter()
+            .map(|one| format!("{} {} at {}", one["code"], one["cause"], one["place"]))
+            .collect::<Vec<_>>()
+    };
+    let as_one = found(&[&both]);
+    assert!(as_one[0].contains("ring-open"), "{as_one:?}");
+    // In either order of the names.
+    assert_eq!(found(&["--together", &a, &b]), as_one);
+    assert_eq!(found(&["--together", &b, &a]), as_one);
+}
+
+#[test]
+fn network_of_a_ring_is_surveyed_from_captures_of_both_cards() {
+    let folder = tempfile::tempdir().unwrap();
+    let (both, [a, b]) = recorded(folder.path(), "");
+    let one = linesman(["capture", "info", "--json", &both]).json();
+    let run = linesman(["capture", "info", "--json", "--together", &a, &b]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    let merged = run.json();
+    for part in ["devices", "links", "commands", "network", "image"] {
+        assert_eq!(merged[part], one[part], "{part}");
+    }
+    assert_eq!(merged["recording"]["requests"], one["recording"]["requests"]);
+    assert_eq!(merged["recording"]["interfaces"].as_array().unwrap().len(), 2);
+    // Each request goes out by both cards, and is one.
+    let states = one["states"].as_array().unwrap();
+    let asked: Vec<_> = states.iter().filter(|one| one["what"] == "asked").collect();
+    assert!(!asked.is_empty());
+    for request in asked {
+        assert!(request["wkc"].as_u64() > Some(0), "somebody has taken it: {request}");
+    }
+}
+
+#[test]
+fn files_that_are_no_recording_together_are_refused_with_the_next_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("not-there.pcapng").display().to_string();
+    let run = linesman(["diagnose", "--together", &path, &path]);
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert!(run.stderr.contains("--together takes capture files"), "{}", run.stderr);
+    let run = linesman(["capture", "info", "before.pcapng", "after.pcapng"]);
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert!(run.stderr.contains("add --together"), "{}", run.stderr);
+}
