@@ -3,6 +3,7 @@
 //! A target panics when a promise is broken: not only by a crash of the code under test, but also
 //! by an assertion here, such as "what was built reads as what was meant".
 
+mod bundle;
 mod capture;
 mod capture_filter;
 mod device;
@@ -22,6 +23,7 @@ mod segment_file;
 mod series;
 mod sii;
 
+pub use bundle::{BETWEEN_MEMBERS, bundle, packed};
 pub use capture::capture;
 pub use capture_filter::capture_filter;
 pub use device_builder::device_builder;
@@ -44,6 +46,7 @@ pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
 pub const TARGETS: &[Target] = &[
+    ("bundle", bundle),
     ("capture", capture),
     ("capture_filter", capture_filter),
     ("device_builder", device_builder),

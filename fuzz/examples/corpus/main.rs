@@ -22,7 +22,7 @@ use linesman_proto::sii::{
 
 mod texts;
 
-use texts::{observation_files, pasted_texts};
+use texts::{bundles, observation_files, pasted_texts};
 
 type Made = Vec<(&'static str, Vec<u8>)>;
 
@@ -30,6 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frames = frames()?;
     let captures = captures(&frames)?;
     let targets = [
+        ("bundle", bundles(&captures)),
         ("capture_filter", conditions()?),
         ("segment", series(&frames)),
         ("diagnosis", series(&frames)),

@@ -1,4 +1,7 @@
-//! Observation files and texts of other tools.
+//! Observation files, texts of other tools, and members of bundles.
+
+use linesman_fuzz::{BETWEEN_MEMBERS, packed};
+use linesman_runtime::bundle::MEMBERS;
 
 use super::Made;
 
@@ -69,5 +72,43 @@ pub(crate) fn pasted_texts() -> Made {
         ("messages.txt", text(messages)),
         ("all.txt", text(&all)),
         ("online-utf-16.txt", wide),
+    ]
+}
+
+/// Manifest of a bundle of a ring that was cut.
+const BUNDLE_MANIFEST: &str = r#"{"schema": "linesman.bundle/1", "tool": "corpus", "source": "sim:ring.toml",
+"start": null, "start_unix_ns": 0, "clock": "virtual", "end_ns": 4003017190, "has_ended": true, "input": "driven",
+"host_counters": true, "probes": true, "active": false,
+"triggers": [{"id": "F1", "at_ns": 1506148532, "finding": {"code": "H101", "cause": "ring-open",
+"place": {"kind": "link", "network": 0, "a": {"no": 2, "port": "B"}, "b": {"no": 3, "port": "A"}, "direction": "both"}}}],
+"findings": [], "stretches": [{"from_ns": 0, "to_ns": 4003017190, "frames": 4, "left_out_before": 0}], "left_out": [],
+"exchange": {"datagrams": [{"command": 12, "start": 16777216, "len": 2, "working_counter": 3}], "fmmus": []},
+"anonymised": null}
+"#;
+
+/// Observations of a bundle.
+const BUNDLE_OBSERVATIONS: &str = r#"{"after_frame":0,"at_ns":0,"network":0,"noticed":{"kind":"carrier","card":"A","link":true}}
+{"after_frame":1,"at_ns":7,"network":0,"noticed":{"kind":"card-errors","card":"B","crc":1,"other":0}}
+{"after_frame":2,"at_ns":9,"network":0,"noticed":{"kind":"left-out","frames":3}}
+{"after_frame":3,"at_ns":10,"network":0,"noticed":{"kind":"clock-step","card":"A","step_ns":-5}}
+"#;
+
+/// Bundles: members of one, in their order, and archives of them that are whole and cut off.
+pub(crate) fn bundles(captures: &Made) -> Made {
+    let find = |name: &str| captures.iter().find(|(other, _)| other.starts_with(name));
+    let frames = find("two-interfaces").map(|(_, bytes)| bytes.clone()).unwrap_or_default();
+    let members: [&[u8]; 4] = [
+        BUNDLE_MANIFEST.as_bytes(),
+        &frames,
+        BUNDLE_OBSERVATIONS.as_bytes(),
+        b"name = \"line\"\n\n[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n",
+    ];
+    let named: Vec<(&str, &[u8])> = MEMBERS.into_iter().zip(members).collect();
+    let archive = packed(&named);
+    vec![
+        ("cut-link.bin", members.join(BETWEEN_MEMBERS)),
+        ("manifest-alone.bin", BUNDLE_MANIFEST.as_bytes().to_vec()),
+        ("cut-off.bin", archive[..archive.len() - 30].to_vec()),
+        ("archive.bin", archive),
     ]
 }
