@@ -27,7 +27,7 @@ pub struct Capture {
 /// Reader of the present file, or of all files that were recorded side by side.
 enum FrameSource {
     /// It is read as its frames are asked for: what comes through a pipe is shown as soon as it is there.
-    Direct(CaptureReader),
+    Direct(Box<CaptureReader>),
     /// A thread reads ahead.
     Ahead(ReadAhead),
     /// Several files by the times of their frames.
@@ -227,9 +227,9 @@ impl FrameSource {
     /// A reader, in a thread of its own where it reads a file and the system gives one.
     fn of(reader: CaptureReader, is_file: bool) -> Self {
         if !is_file {
-            return Self::Direct(reader);
+            return Self::Direct(Box::new(reader));
         }
-        ReadAhead::start(reader).map_or_else(|reader| Self::Direct(*reader), Self::Ahead)
+        ReadAhead::start(reader).map_or_else(Self::Direct, Self::Ahead)
     }
 
     #[inline]
