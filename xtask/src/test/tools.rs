@@ -22,6 +22,7 @@ const PYTHON_PACKAGES: &[(&str, &str)] = &[
     ("pysoem", "pysoem==1.1.13"),
     ("kickcat", "kickcat==2.5"),
     ("ebpfcat", "ebpfcat==1.0.0"),
+    ("pyetg1510", "pyetg1510==0.1.3"),
     ("duckdb", "duckdb==2.0.1"),
 ];
 
