@@ -131,6 +131,8 @@ catalogue! {
         "A SubDevice answers mailbox requests later than expected.";
     MailboxStuck "mailbox-stuck" Software
         "A SubDevice does not empty or fill its mailbox any more.";
+    EoeFault "eoe-fault" Software
+        "The EoE stack of a SubDevice loses, doubles or mixes up fragments of Ethernet frames, or has no buffer for them.";
     Emergency "emergency" Software
         "A SubDevice sent an emergency message.";
     RingOpen "ring-open" Hardware

@@ -120,7 +120,9 @@ impl Subject {
             F::LinkFlapping | F::EarlyLink => Self::LinkStatus,
             F::DeviceExtra | F::DeviceWrong | F::DevicesSwapped | F::TwinsSwapped => Self::Identity,
             F::PortsSwapped | F::MainDeviceWrongPort => Self::Wiring,
-            F::MailboxError | F::MailboxSlow | F::MailboxStuck | F::Emergency => Self::Mailboxes,
+            F::MailboxError | F::MailboxSlow | F::MailboxStuck | F::EoeFault | F::Emergency => {
+                Self::Mailboxes
+            }
             F::ClockDrift | F::ReferenceClockLost => Self::Clocks,
             F::LateFrames => Self::Timing,
             F::HostJitter | F::OneSidedRecording => Self::Host,

@@ -177,6 +177,11 @@ const CLOCKED: [FaultName; 4] = [
     FaultName::CycleTooFast,
 ];
 
+/// What is drawn of the catalogue. Lines of the score carry no Ethernet frames, so that a faulty EoE stack shows nowhere.
+fn catalogue() -> impl Iterator<Item = FaultName> {
+    KINDS.iter().map(|kind| kind.name).filter(|name| *name != FaultName::EoeFault)
+}
+
 fn faults(options: &ScoreOptions, stream: &mut Stream) -> (CaseKind, Vec<FaultName>) {
     let kind = match stream.below(100) {
         0..12 => CaseKind::Healthy,
@@ -184,7 +189,7 @@ fn faults(options: &ScoreOptions, stream: &mut Stream) -> (CaseKind, Vec<FaultNa
         26..38 => CaseKind::Masked,
         _ => CaseKind::Single,
     };
-    let catalogue = KINDS.iter().map(|kind| kind.name).collect::<Vec<_>>();
+    let catalogue = catalogue().collect::<Vec<_>>();
     let drawn = stream.pick(&catalogue).copied();
     let mut physical = [stream.pick(&AT_RUN_TIME).copied(), stream.pick(&AT_RUN_TIME).copied()];
     if physical == [Some(FaultName::NicDamaged); 2] {
@@ -256,9 +261,9 @@ mod tests {
     fn every_fault_of_the_catalogue_and_every_kind_of_case_is_drawn() {
         let draw = |seed| faults(&ScoreOptions::default(), &mut Seed(seed).stream("score"));
         let drawn: Vec<_> = (0..2_000).map(draw).collect();
-        for kind in KINDS {
-            let count = drawn.iter().filter(|(_, faults)| faults.contains(&kind.name)).count();
-            assert!(count >= 10, "{}: {count}", kind.name);
+        for name in catalogue() {
+            let count = drawn.iter().filter(|(_, faults)| faults.contains(&name)).count();
+            assert!(count >= 10, "{name}: {count}");
         }
         for kind in [CaseKind::Healthy, CaseKind::Single, CaseKind::Masked, CaseKind::Double] {
             let count = drawn.iter().filter(|(drawn, _)| *drawn == kind).count();

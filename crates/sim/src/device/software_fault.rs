@@ -30,6 +30,32 @@ pub enum SoftwareFault {
     LockedBuffers,
     /// A setting of it does not fit what its data say.
     Mismatch(Mismatch),
+    /// Fragments of the Ethernet frames that it sends do not leave as they should (EoE).
+    SpoilsFragments(SpoiledFragments),
+    /// It has no buffer for Ethernet frames of the MainDevice, and refuses their fragments (EoE).
+    EoeBufferFull,
+}
+
+/// What becomes of a fragment.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum FragmentTrouble {
+    /// It is left out.
+    Lost,
+    /// It leaves twice, as two messages.
+    Doubled,
+    /// It leaves after the next one of its frame.
+    OutOfOrder,
+}
+
+/// Which fragments do not leave as they should.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct SpoiledFragments {
+    /// What becomes of them.
+    pub trouble: FragmentTrouble,
+    /// How many of 1,000,000 fragments.
+    pub share_ppm: u32,
+    /// What decides which ones.
+    pub seed: Seed,
 }
 
 /// Which setting does not fit.
@@ -76,7 +102,9 @@ impl SoftwareFaults {
     pub fn begin(&mut self, software_fault: SoftwareFault) {
         let seed = match software_fault {
             SoftwareFault::RefusesSdo(refusals) => refusals.seed,
-            SoftwareFault::SlowMailbox { .. }
+            SoftwareFault::SpoilsFragments(spoiled) => spoiled.seed,
+            SoftwareFault::EoeBufferFull
+            | SoftwareFault::SlowMailbox { .. }
             | SoftwareFault::MailboxNotRead
             | SoftwareFault::MailboxNotFilled
             | SoftwareFault::FrozenApplication
@@ -111,7 +139,9 @@ impl SoftwareFaults {
             | SoftwareFault::FrozenApplication
             | SoftwareFault::DeafToRequests
             | SoftwareFault::LockedBuffers
-            | SoftwareFault::Mismatch(_) => sum,
+            | SoftwareFault::Mismatch(_)
+            | SoftwareFault::SpoilsFragments(_)
+            | SoftwareFault::EoeBufferFull => sum,
         })
     }
 
@@ -130,7 +160,29 @@ impl SoftwareFaults {
             | SoftwareFault::FrozenApplication
             | SoftwareFault::DeafToRequests
             | SoftwareFault::LockedBuffers
-            | SoftwareFault::Mismatch(_) => None,
+            | SoftwareFault::Mismatch(_)
+            | SoftwareFault::SpoilsFragments(_)
+            | SoftwareFault::EoeBufferFull => None,
+        })
+    }
+
+    /// What becomes of a fragment of an Ethernet frame that it sends; `None`: it leaves as it should. Each call is one
+    /// fragment: chance is drawn anew.
+    pub fn spoils_fragment(&mut self) -> Option<FragmentTrouble> {
+        self.0.iter_mut().find_map(|(software_fault, stream)| match software_fault {
+            SoftwareFault::SpoilsFragments(spoiled) => {
+                let hit = stream.below(1_000_000) < u64::from(spoiled.share_ppm);
+                hit.then_some(spoiled.trouble)
+            }
+            SoftwareFault::RefusesSdo(_)
+            | SoftwareFault::SlowMailbox { .. }
+            | SoftwareFault::MailboxNotRead
+            | SoftwareFault::MailboxNotFilled
+            | SoftwareFault::FrozenApplication
+            | SoftwareFault::DeafToRequests
+            | SoftwareFault::LockedBuffers
+            | SoftwareFault::Mismatch(_)
+            | SoftwareFault::EoeBufferFull => None,
         })
     }
 }

@@ -46,7 +46,7 @@ impl Carrier {
             TransmitterDamaged => Self::Sender,
             ReceiverDamaged => Self::Receiver,
             DeviceInternal | FirmwareFault | MailboxError | MailboxSlow | MailboxStuck
-            | Emergency | ClockDrift | ReferenceClockLost => Self::Device,
+            | EoeFault | Emergency | ClockDrift | ReferenceClockLost => Self::Device,
             DeviceOff | SupplyOff | BrownOut | EbusOverload => Self::Supply,
             InitRefused | ConfigMismatch | WatchdogStarved | CycleTooFast | SyncLost => {
                 Self::Settings

@@ -26,6 +26,7 @@ const FILES: &[(&str, &str)] = files![
     "ebus_overload",
     "emc_noise",
     "emergency",
+    "eoe_fault",
     "false_link",
     "firmware_fault",
     "foreign_frames",

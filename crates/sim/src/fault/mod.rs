@@ -30,6 +30,7 @@ mod early_link;
 mod ebus_overload;
 mod emc_noise;
 mod emergency;
+mod eoe_fault;
 mod false_link;
 mod firmware_fault;
 mod foreign_frames;
@@ -138,6 +139,7 @@ pub const KINDS: &[Kind] = &[
     mailbox_error::KIND,
     mailbox_slow::KIND,
     mailbox_stuck::KIND,
+    eoe_fault::KIND,
     emergency::KIND,
     firmware_fault::KIND,
     watchdog_starved::KIND,

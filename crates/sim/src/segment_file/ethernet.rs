@@ -2,9 +2,12 @@
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::ethernet::MacAddress;
+use linesman_proto::time::Span;
 use serde::{Deserialize, Serialize};
 
-use crate::device::ethernet::{EthernetSetup, HostAddress, PluggedHost};
+use crate::device::ethernet::{
+    EthernetSetup, HostAddress, LONGEST_DATAGRAM, PluggedHost, UdpDatagrams,
+};
 
 /// The Ethernet side of a device that speaks EoE.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
@@ -21,9 +24,23 @@ pub struct SegmentEthernet {
     /// It fetches its address by DHCP.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub dhcp: bool,
+    /// What it sends of its own accord. It needs a fixed address, `ip`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sends: Option<SegmentDatagrams>,
     /// Computers that are plugged into its ports, for a switch terminal.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub hosts: Vec<SegmentHost>,
+}
+
+/// UdpDatagrams that a device sends to all in its subnet (UDP port 9, discard), as drives send recorded values.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct SegmentDatagrams {
+    /// Bytes in each, 0 to 1,472.
+    pub bytes: u16,
+    /// From one to the next, in ms, from 1.
+    pub every_ms: u32,
 }
 
 /// A computer at a port of a switch terminal. It answers ARP and ping, and has a web page.
@@ -61,9 +78,28 @@ impl SegmentEthernet {
             Ok::<_, String>(PluggedHost { port: host.port, address })
         };
         let hosts = self.hosts.iter().map(host).collect::<Result<_, _>>()?;
+        let datagrams = match (self.sends, address) {
+            (None, _) => None,
+            (Some(sends), HostAddress::Fixed { ip, .. })
+                if sends.bytes <= LONGEST_DATAGRAM && sends.every_ms > 0 =>
+            {
+                let every = Span::ms(sends.every_ms.into());
+                Some(UdpDatagrams { from: ip, bytes: sends.bytes, every })
+            }
+            (Some(_), HostAddress::Fixed { .. }) => {
+                return Err(format!(
+                    "`sends`: expected `bytes` from 0 to {LONGEST_DATAGRAM} and `every_ms` from 1"
+                ));
+            }
+            (Some(_), HostAddress::None | HostAddress::Dhcp) => {
+                return Err(
+                    "`sends` needs a fixed address: give it `ip = \"192.168.1.11/24\"`".to_owned()
+                );
+            }
+        };
         let [.., high, low] = id.no().to_be_bytes();
         // A locally administered address; its last byte counts the hosts.
         let mac = MacAddress([0x02, 0x4C, 0x4D, high, low, 0]);
-        Ok(EthernetSetup { name: name.to_owned(), mac, address, hosts })
+        Ok(EthernetSetup { name: name.to_owned(), mac, address, datagrams, hosts })
     }
 }

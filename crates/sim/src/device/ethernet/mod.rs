@@ -4,12 +4,14 @@
 //! the network of the MainDevice. Any other device has a web page. The IP stack is smoltcp, which takes bytes and time as
 //! arguments as everything here does.
 
+mod datagrams;
 mod dhcp_server;
 mod host_address;
 mod ip_host;
 mod side;
 mod web_page;
 
+pub use datagrams::{LONGEST_DATAGRAM, UdpDatagrams};
 pub use host_address::HostAddress;
 pub use ip_host::IpHost;
 pub use side::{EthernetFunction, EthernetSetup, EthernetSide, PluggedHost};

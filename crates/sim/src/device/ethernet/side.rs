@@ -6,6 +6,7 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::mailbox::eoe::IpParameters;
 use linesman_proto::time::Instant;
 
+use super::datagrams::{DatagramSource, UdpDatagrams};
 use super::dhcp_server::DhcpServer;
 use super::host_address::HostAddress;
 use super::ip_host::IpHost;
@@ -40,6 +41,8 @@ pub struct EthernetSetup {
     pub mac: MacAddress,
     /// Its own IP address, set by some other way than EoE.
     pub address: HostAddress,
+    /// What it sends of its own accord.
+    pub datagrams: Option<UdpDatagrams>,
     /// The computers at its ports.
     pub hosts: Vec<PluggedHost>,
 }
@@ -50,6 +53,7 @@ pub struct EthernetSide {
     mac: MacAddress,
     /// The IP stack of its own, and its address while the MainDevice has set none.
     own: Option<(IpHost, HostAddress)>,
+    datagrams: Option<DatagramSource>,
     hosts: Vec<IpHost>,
     dhcp: DhcpServer,
     /// Frames to the MainDevice.
@@ -60,7 +64,7 @@ impl EthernetSide {
     /// The Ethernet side of a device that does this with frames.
     #[must_use]
     pub fn new(function: EthernetFunction, setup: &EthernetSetup) -> Self {
-        let EthernetSetup { name, mac, address, hosts } = setup;
+        let EthernetSetup { name, mac, address, datagrams, hosts } = setup;
         let own = match function {
             EthernetFunction::IpApplication => Some((IpHost::new(name, *mac, *address), *address)),
             EthernetFunction::SwitchPorts(_) => None,
@@ -71,7 +75,14 @@ impl EthernetSide {
             IpHost::new(&format!("{name}, port {}", host.port), mac, host.address)
         };
         let hosts = (1..).zip(hosts).map(plugged).collect();
-        Self { mac: *mac, own, hosts, dhcp: DhcpServer::default(), sent: VecDeque::new() }
+        Self {
+            mac: *mac,
+            own,
+            datagrams: datagrams.map(DatagramSource::new),
+            hosts,
+            dhcp: DhcpServer::default(),
+            sent: VecDeque::new(),
+        }
     }
 
     /// The device has started anew: what the MainDevice had set is forgotten, the computers at its ports stay.
@@ -103,6 +114,9 @@ impl EthernetSide {
 
     /// Does what is to be done now.
     pub fn handle_timeout(&mut self, now: Instant) {
+        if let Some(frame) = self.datagrams.as_mut().and_then(|source| source.poll(now, self.mac)) {
+            push(&mut self.sent, frame);
+        }
         if let Some((own, _)) = &mut self.own {
             own.handle_timeout(now);
             while let Some(frame) = own.poll_transmit() {
@@ -137,7 +151,8 @@ impl EthernetSide {
     pub fn poll_timeout(&mut self, now: Instant) -> Option<Instant> {
         let own = self.own.as_mut().and_then(|(own, _)| own.poll_timeout(now));
         let hosts = self.hosts.iter_mut().filter_map(|host| host.poll_timeout(now));
-        own.into_iter().chain(hosts).min()
+        let datagrams = self.datagrams.as_ref().and_then(DatagramSource::due);
+        own.into_iter().chain(hosts).chain(datagrams).min()
     }
 
     /// The next frame for the MainDevice.

@@ -13,6 +13,7 @@ use linesman_proto::time::Instant;
 
 use super::Answers;
 use crate::device::ethernet::EthernetSide;
+use crate::device::software_fault::{FragmentTrouble, SoftwareFault, SoftwareFaults};
 
 /// The port.
 #[derive(Default, Debug)]
@@ -46,12 +47,17 @@ impl EoePort {
     }
 
     /// The next fragment for the MainDevice, for a mailbox of so many bytes.
-    pub(super) fn poll_fragment(&mut self, mailbox: usize) -> Option<Vec<u8>> {
-        if self.fragments.is_empty() {
+    pub(super) fn poll_fragment(
+        &mut self,
+        mailbox: usize,
+        software_faults: &mut SoftwareFaults,
+    ) -> Option<Vec<u8>> {
+        while self.fragments.is_empty() {
             let frame = self.side.as_mut()?.poll_transmit()?;
             let room = mailbox.saturating_sub(HEADER_LEN);
             let pieces = fragments(&frame, 0, self.number, room);
-            self.fragments = pieces.map(|piece| write(&Message::Fragment(piece))).collect();
+            let pieces = pieces.map(|piece| write(&Message::Fragment(piece)));
+            self.fragments = spoiled(pieces, software_faults);
             self.number = (self.number + 1) & 0x0F;
         }
         self.fragments.pop_front()
@@ -62,8 +68,13 @@ impl EoePort {
         &mut self,
         request: &[u8],
         now: Instant,
+        software_faults: &SoftwareFaults,
     ) -> Result<Answers, ErrorReplyCode> {
         match Message::parse(request) {
+            Ok(Message::Fragment(_)) if software_faults.has(SoftwareFault::EoeBufferFull) => {
+                self.assembly = Assembly::default();
+                Err(ErrorReplyCode::NoMemory)
+            }
             Ok(Message::Fragment(fragment)) => Ok(self.take(&fragment, now)),
             Ok(Message::Request { port, about, parameters }) => {
                 Ok(vec![self.set_or_get(port, about, parameters)])
@@ -114,6 +125,27 @@ impl EoePort {
     }
 }
 
+/// The fragments of a frame as they leave: all of them in order, or not.
+fn spoiled(
+    pieces: impl Iterator<Item = Vec<u8>>,
+    software_faults: &mut SoftwareFaults,
+) -> VecDeque<Vec<u8>> {
+    let mut leaving = VecDeque::new();
+    let mut late = None;
+    for piece in pieces {
+        let overtaken = late.take();
+        match software_faults.spoils_fragment() {
+            Some(FragmentTrouble::Lost) => {}
+            Some(FragmentTrouble::OutOfOrder) if overtaken.is_none() => late = Some(piece),
+            Some(FragmentTrouble::Doubled) => leaving.extend([piece.clone(), piece]),
+            Some(FragmentTrouble::OutOfOrder) | None => leaving.push_back(piece),
+        }
+        leaving.extend(overtaken);
+    }
+    leaving.extend(late);
+    leaving
+}
+
 fn write(message: &Message<'_>) -> Vec<u8> {
     let body = match message {
         Message::Fragment(fragment) => fragment.data.len(),
@@ -132,11 +164,13 @@ mod tests {
     use linesman_proto::mailbox::eoe::fragments;
 
     use super::*;
+    use crate::device::software_fault::SpoiledFragments;
+    use crate::seed::Seed;
 
     fn ask(port: &mut EoePort, message: &Message<'_>) -> Vec<Vec<u8>> {
         let mut buffer = [0; 2_000];
         let len = message.write(&mut buffer).unwrap();
-        port.answer(&buffer[..len], Instant::from_nanos(77)).unwrap()
+        port.answer(&buffer[..len], Instant::from_nanos(77), &SoftwareFaults::default()).unwrap()
     }
 
     #[test]
@@ -159,8 +193,33 @@ mod tests {
         assert_eq!(ask(&mut port, &cut_off), [vec![0x03, 0x01, 0x01, 0x00]]);
         let filter = Message::Request { port: 0, about: Setting::SetFilter, parameters: &[] };
         assert_eq!(ask(&mut port, &filter), [vec![0x05, 0x01, 0x01, 0x04]]);
-        let err = port.answer(&[0x0F, 0, 0, 0], Instant::ZERO).unwrap_err();
+        let err =
+            port.answer(&[0x0F, 0, 0, 0], Instant::ZERO, &SoftwareFaults::default()).unwrap_err();
         assert_eq!(err, ErrorReplyCode::InvalidHeader);
+    }
+
+    #[test]
+    fn fragments_are_lost_doubled_or_overtaken_and_a_full_buffer_refuses_them() {
+        let pieces = || (0..6_u8).map(|at| vec![at]);
+        let leave = |trouble, share_ppm| {
+            let mut faults = SoftwareFaults::default();
+            let seed = Seed(3);
+            let spoils = SpoiledFragments { trouble, share_ppm, seed };
+            faults.begin(SoftwareFault::SpoilsFragments(spoils));
+            spoiled(pieces(), &mut faults).into_iter().flatten().collect::<Vec<u8>>()
+        };
+        let all = 1_000_000;
+        assert_eq!(leave(FragmentTrouble::Lost, 0), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(leave(FragmentTrouble::Lost, all), [0_u8; 0]);
+        assert_eq!(leave(FragmentTrouble::Doubled, all), [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]);
+        assert_eq!(leave(FragmentTrouble::OutOfOrder, all), [1, 0, 3, 2, 5, 4]);
+        let mut faults = SoftwareFaults::default();
+        faults.begin(SoftwareFault::EoeBufferFull);
+        let piece = fragments(&[0x55; 60], 0, 0, 132).next().unwrap();
+        let mut buffer = [0; 200];
+        let len = Message::Fragment(piece).write(&mut buffer).unwrap();
+        let refused = EoePort::default().answer(&buffer[..len], Instant::ZERO, &faults);
+        assert_eq!(refused, Err(ErrorReplyCode::NoMemory));
     }
 
     #[test]

@@ -141,7 +141,7 @@ impl Mailbox {
             }
         }
         self.tell(served.state);
-        let frames = self.frames(now, pdi, served.state);
+        let frames = self.frames(now, pdi, served);
         if fills {
             self.outbox.deliver(pdi);
         }
@@ -152,13 +152,13 @@ impl Mailbox {
 
     /// Puts fragments of Ethernet frames among the messages that wait, and says when to look again. Room for an answer is
     /// left.
-    fn frames(&mut self, now: Instant, pdi: &Pdi<'_>, state: AlState) -> Option<Instant> {
-        if state == AlState::Boot || !self.protocols.has(Protocols::EOE) {
+    fn frames(&mut self, now: Instant, pdi: &Pdi<'_>, served: &mut Served<'_>) -> Option<Instant> {
+        if served.state == AlState::Boot || !self.protocols.has(Protocols::EOE) {
             return None;
         }
         let due = self.eoe.handle_timeout(now);
         while self.outbox.len() + 1 < WAITING
-            && let Some(fragment) = self.eoe.poll_fragment(answer_room(pdi))
+            && let Some(fragment) = self.eoe.poll_fragment(answer_room(pdi), served.software_faults)
         {
             self.outbox.push(MailboxType::Eoe, Envelope::UNASKED, fragment);
         }
@@ -219,7 +219,7 @@ impl Mailbox {
                 self.foe.answer(message.data, served.files, served.state, now, limits)
             }
             MailboxType::Eoe if !boots && self.protocols.has(Protocols::EOE) => {
-                self.eoe.answer(message.data, now)
+                self.eoe.answer(message.data, now, served.software_faults)
             }
             MailboxType::Soe if !boots && self.protocols.has(Protocols::SOE) => {
                 Ok(soe::answer(message.data).into_iter().collect())
