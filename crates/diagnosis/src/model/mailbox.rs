@@ -7,6 +7,7 @@ use linesman_proto::mailbox::coe::diagnosis::Severity;
 use linesman_proto::mailbox::error_reply::ErrorReplyCode;
 use linesman_proto::time::{Instant, Span};
 
+use super::ethernet::EthernetHistory;
 use super::{Seen, push_kept};
 
 /// From so long on an answer is worth a word. SubDevices answer within some ms.
@@ -34,6 +35,10 @@ pub struct MailboxHistory {
     pub refusals: VecDeque<Seen<MailboxRefusal>>,
     /// Answers that took [`NOTABLE`] or longer, oldest first.
     pub slow: VecDeque<Seen<SlowAnswer>>,
+    /// The latest request that was taken is a fragment of an Ethernet frame (EoE), which nothing answers.
+    pub carries_frame: bool,
+    /// Ethernet frames through it (EoE).
+    pub ethernet: EthernetHistory,
     /// Messages of the diagnosis history (object 0x10F3) in the order in which they were read.
     pub messages: VecDeque<Seen<HistoryMessage>>,
 }
@@ -61,6 +66,8 @@ pub struct SlowAnswer {
     pub object: Option<ObjectAddress>,
     /// When it was asked.
     pub asked: Instant,
+    /// Not an answer came late: a fragment of an Ethernet frame was taken late, which nothing answers.
+    pub carries_frame: bool,
 }
 
 /// A message of a diagnosis history.
@@ -88,6 +95,7 @@ impl MailboxHistory {
         frame: u64,
     ) {
         self.reads_whole = reads_whole;
+        self.carries_frame = false;
         if let Some((since, until)) = self.full.take() {
             self.note_stuck(since.at, until.max(at));
         }
@@ -95,6 +103,22 @@ impl MailboxHistory {
         if let Some(waiting) = self.waiting.replace(Seen::new(object, at, Some(frame))) {
             self.note_stuck(waiting.at, at);
         }
+    }
+
+    /// A fragment of an Ethernet frame was taken, which nothing answers. Says whether the mailbox had been full for long
+    /// enough to be worth a word.
+    pub fn frame_taken(&mut self, at: Instant, frame: u64) -> bool {
+        self.carries_frame = true;
+        self.fetched();
+        let Some((since, until)) = self.full.take() else { return false };
+        self.note_stuck(since.at, until);
+        let took = until.since(since.at);
+        if took < NOTABLE || took >= STUCK {
+            return took >= STUCK;
+        }
+        let slow = SlowAnswer { object: None, asked: since.at, carries_frame: true };
+        push_kept(&mut self.slow, Seen::new(slow, at, Some(frame)));
+        true
     }
 
     /// A request was not taken: the one before is still in the mailbox.
@@ -128,7 +152,7 @@ impl MailboxHistory {
         if at.since(waiting.at) < NOTABLE {
             return false;
         }
-        let slow = SlowAnswer { object: waiting.value, asked: waiting.at };
+        let slow = SlowAnswer { object: waiting.value, asked: waiting.at, carries_frame: false };
         push_kept(&mut self.slow, Seen::new(slow, at, Some(frame)));
         true
     }

@@ -10,6 +10,7 @@ pub mod cycle_timing;
 pub mod cyclic;
 pub mod device;
 pub mod dl_history;
+pub mod ethernet;
 pub mod event_field;
 mod expected_wkc;
 pub mod host;

@@ -4,7 +4,8 @@
 //!
 //! **How it is found.** Requests and answers are seen in the mailbox areas behind 0x1000. `S250`: an SDO is
 //! aborted, or the mailbox answers with an error of its own. `S251`: an answer came 300 ms or longer after
-//! its request; from 100 ms on it is told and is no warning yet. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
+//! its request, or a fragment of an Ethernet frame (EoE), which nothing answers, was not taken for so long; from 100 ms on it is
+//! told and is no warning yet. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
 //! still in the mailbox, or status 0x0805 reads full all the time), or it is taken and the MainDevice looks for the answer in vain, while the controller answers as always.
 //!
 //! **What it means.** The mailbox is served by another part of the firmware than process data and states:
@@ -130,7 +131,11 @@ fn slow(model: &NetworkModel, device: &Device) -> Option<Condition> {
     for seen in all.iter().rev().take(SHOWN) {
         let ms = seen.at.since(seen.value.asked).as_nanos() / 1_000_000;
         let what = seen.value.object.map_or_else(String::new, |object| format!(" to {object}"));
-        let text = format!("{} answers a request{what} after {ms} ms", model.label(device.id));
+        let label = model.label(device.id);
+        let text = match seen.value.carries_frame {
+            true => format!("{label} takes no further Ethernet fragment for {ms} ms (EoE)"),
+            false => format!("{label} answers a request{what} after {ms} ms"),
+        };
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
     }
     Some(
@@ -210,7 +215,7 @@ fn processor_stopped_about(model: &NetworkModel, since: Instant) -> Option<Seen<
     model.changed_link().filter(is_then)
 }
 
-fn begin(
+pub(super) fn begin(
     model: &NetworkModel,
     device: &Device,
     page: &'static RulePage,

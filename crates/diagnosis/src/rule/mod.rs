@@ -12,6 +12,7 @@ pub mod early_link;
 pub mod ebus_budget;
 pub mod emergency;
 pub mod errors_at_device;
+pub mod ethernet;
 pub mod exchanged;
 pub mod fewer_answer;
 pub mod foreign_frames;
@@ -134,6 +135,7 @@ pub const RULES: &[Rule] = &[
     late::RULE,
     paused::RULE,
     mailbox::RULE,
+    ethernet::RULE,
     inputs_still::RULE,
     device_message::RULE,
     counters::RULE,

@@ -1,12 +1,12 @@
 //! Mailbox messages: the identity as the object dictionary has it (SDO uploads of 0x1018), messages of
-//! the diagnosis history (0x10F3), emergencies, and the outcome of requests.
+//! the diagnosis history (0x10F3), emergencies, fragments of Ethernet frames, and the outcome of requests.
 
-use linesman_proto::address::DeviceId;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::mailbox::coe::diagnosis::DiagnosisMessage;
 use linesman_proto::mailbox::coe::sdo::{Request, Response};
 use linesman_proto::mailbox::coe::{Emergency, Message, ObjectAddress, ObjectIndex};
 use linesman_proto::mailbox::error_reply::ErrorReply;
-use linesman_proto::mailbox::{Header, MailboxType};
+use linesman_proto::mailbox::{Header, MailboxType, eoe};
 
 use super::Answer;
 use crate::model::mailbox::{HistoryMessage, MailboxRefusal};
@@ -21,10 +21,19 @@ const FIRST_MESSAGE: u8 = 6;
 pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) {
     let data = answer.reply.data();
     // Cheap checks first: this is asked of every read of process RAM.
-    let Some((kind, body)) = message(data) else { return };
+    let Some((header, body)) = message(data) else { return };
     let (at, frame) = (answer.at, answer.frame);
     let Some(device) = model.devices.get_mut(id.index()) else { return };
-    let news = match kind {
+    let is_its = is_mailbox(device, ANSWERS, answer.ado);
+    let is_new = is_its && device.mailbox.ethernet.count(header.counter);
+    let news = match header.kind {
+        MailboxType::Error if device.mailbox.carries_frame => match ErrorReply::parse(body) {
+            Ok(reply) if is_new && body.len() == ErrorReply::LEN => {
+                device.mailbox.ethernet.refuse(reply.code, at, frame);
+                true
+            }
+            Ok(_) | Err(_) => false,
+        },
         MailboxType::Error => match ErrorReply::parse(body) {
             Ok(reply) if body.len() == ErrorReply::LEN => {
                 device.mailbox.answered(at, frame);
@@ -67,8 +76,13 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
             }
             Ok(_) | Err(_) => false,
         },
-        MailboxType::Eoe
-        | MailboxType::Foe
+        MailboxType::Eoe => match eoe::Message::parse(body) {
+            Ok(eoe::Message::Fragment(fragment)) if is_new => {
+                device.mailbox.ethernet.take(&fragment, at, frame)
+            }
+            Ok(_) | Err(_) => false,
+        },
+        MailboxType::Foe
         | MailboxType::Soe
         | MailboxType::Aoe
         | MailboxType::Voe
@@ -81,7 +95,13 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
 
 /// A mailbox was written to, or another part of the process RAM; or was not, if `taken` is false.
 pub(super) fn written(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>, taken: bool) {
-    let Some((MailboxType::Coe, body)) = message(answer.written()) else { return };
+    let Some((header, body)) = message(answer.written()) else { return };
+    if header.kind == MailboxType::Eoe {
+        return frame_written(model, id, answer, body, taken);
+    }
+    if header.kind != MailboxType::Coe {
+        return;
+    }
     let (object, reads_whole) = match Message::parse(body) {
         Ok(Message::SdoRequest(Request::Upload { object, complete })) => (Some(object), complete),
         Ok(Message::SdoRequest(Request::Download { object, .. })) => (Some(object), false),
@@ -100,11 +120,44 @@ pub(super) fn written(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_
     model.touch();
 }
 
-/// Kind and body of a mailbox message, if the bytes can be one.
-fn message(data: &[u8]) -> Option<(MailboxType, &[u8])> {
+/// A fragment of an Ethernet frame was written into the mailbox, or was not, if `taken` is false.
+fn frame_written(
+    model: &mut NetworkModel,
+    id: DeviceId,
+    answer: &Answer<'_>,
+    body: &[u8],
+    taken: bool,
+) {
+    let Ok(eoe::Message::Fragment(_)) = eoe::Message::parse(body) else { return };
+    let Some(device) = model.devices.get_mut(id.index()) else { return };
+    if !is_mailbox(device, REQUESTS, answer.ado) {
+        return;
+    }
+    if taken {
+        if !device.mailbox.frame_taken(answer.at, answer.frame) {
+            return;
+        }
+    } else {
+        device.mailbox.not_taken(answer.at, answer.frame);
+    }
+    model.touch();
+}
+
+/// SyncManager of the mailbox that the MainDevice writes.
+const REQUESTS: u8 = 0;
+/// SyncManager of the mailbox that it reads.
+const ANSWERS: u8 = 1;
+
+/// True if the memory from an address on is the mailbox that a SyncManager guards, as it was seen set up.
+fn is_mailbox(device: &Device, manager: u8, address: RegisterAddress) -> bool {
+    device.set_up.sync_managers.get(&manager).is_some_and(|known| known.start == address)
+}
+
+/// Header and body of a mailbox message, if the bytes can be one.
+fn message(data: &[u8]) -> Option<(Header, &[u8])> {
     let header = Header::parse(data).ok()?;
     let end = HEADER_LEN + usize::from(header.length);
-    Some((header.kind, data.get(HEADER_LEN..end)?))
+    Some((header, data.get(HEADER_LEN..end)?))
 }
 
 /// An object was read: the identity, perhaps, or a message of the history. Says whether it is news.
