@@ -11,6 +11,7 @@ use linesman_proto::address::{Network, Path};
 use linesman_session::{DiagnosisInput, RunEvent};
 
 use super::Lab;
+use super::ethernet::LabSwitch;
 use crate::options::Begin;
 
 /// Number of events that are kept; the oldest go first.
@@ -63,6 +64,9 @@ impl Lab {
         if let Some(watch) = &mut self.watch {
             watch.handle_event(now, &event);
         }
+        if let Some(switch) = &mut self.switch {
+            switch.handle_event(now, &event, self.session.main_mut());
+        }
         if self.events.len() >= KEPT_EVENTS {
             self.events.drain(..KEPT_EVENTS / 2);
         }
@@ -76,6 +80,7 @@ impl Lab {
                 let (run, main) = self.session.parts_mut();
                 run.start(now, plan.clone(), main);
                 self.watch = self.options.log.then(|| Watch::new(Arc::new(plan.clone())));
+                self.switch = LabSwitch::of_plan(&plan);
                 self.plan = Some(plan);
             }
             Err(error) => self.failure = Some(error),

@@ -9,6 +9,7 @@ mod capture_probe;
 mod diagnosis;
 mod driver;
 mod error;
+mod ethernet;
 mod events;
 mod line;
 mod object;
@@ -54,10 +55,6 @@ const AT_ONE_INSTANT: u32 = 100_000;
 /// The largest frame, without check sequence.
 const FRAME: usize = 1_514;
 
-/// Frames that compensate the drift of clocks before SubDevices go beyond PREOP: fewer than on a real
-/// line, where the bring-up may take its time.
-const DRIFT_FRAMES: u32 = 2_000;
-
 /// Sees every frame as the diagnosis does.
 pub type Tap = Box<dyn FnMut(&FrameSeen<'_>) + Send>;
 
@@ -80,6 +77,8 @@ pub struct Lab {
     inventory: Option<Inventory>,
     plan: Option<Plan>,
     watch: Option<Watch>,
+    /// There once a plan is run in which SubDevices speak EoE.
+    switch: Option<ethernet::LabSwitch>,
     log: Vec<LogEntry>,
 }
 
@@ -129,7 +128,7 @@ impl Lab {
         };
         let mut settings = Options::default();
         if options.clocks || project.devices.iter().any(|device| device.clock.is_some()) {
-            settings.drift_frames = DRIFT_FRAMES;
+            settings.drift_frames = plan::DRIFT_FRAMES;
         }
         let mut line = LabLine::new(segment, file.ring.is_some(), options.host_counters);
         let main_options = options.habit.main_device(line.line.options(settings));
@@ -155,6 +154,7 @@ impl Lab {
             inventory: None,
             plan: None,
             watch: None,
+            switch: None,
             log: Vec::new(),
             options,
         };

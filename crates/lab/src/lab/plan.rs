@@ -8,6 +8,10 @@ use linesman_proto::time::Span;
 
 use super::Lab;
 
+/// Frames that compensate the drift of clocks before SubDevices go beyond PREOP: fewer than on a real
+/// line, where the bring-up may take its time.
+pub(super) const DRIFT_FRAMES: u32 = 2_000;
+
 impl Lab {
     /// The project's identity of a SubDevice of the plan. A plan numbers what was found in the order
     /// of processing, which for a device with several controllers is not that of the project.
