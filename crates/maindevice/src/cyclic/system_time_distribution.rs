@@ -17,6 +17,9 @@
 //!   station address. ARMW would name a place, to which the reference comes back with a clock that nobody has
 //!   set.
 //!
+//! While frames may travel otherwise than the clocks were told, for somebody came or went, the reference is only asked, too: clocks go on
+//! as fast as they have learnt until the delays are measured again ([`ReferenceClock::delays_known`]).
+//!
 //! In an open ring only one of the two copies of a frame meets the reference, and what the other one would hand round
 //! reaches SubDevices by another way than the one whose delay they know. So the copy of the second card only asks for
 //! the time, until it is known what is right there ([`ReferenceClock::second_card_ns`]).
@@ -224,7 +227,7 @@ impl SystemTimeDistribution {
         // With nobody to stand in, whoever is in the place of the reference is only asked.
         let named = self.known.named;
         let lost = !self.known.stands && named.is_none();
-        let read_only = lost || self.state != ReferenceState::Handed;
+        let read_only = lost || self.state != ReferenceState::Handed || !self.known.delays_known;
         let time = if read_only { 0 } else { datagram.cut(self.expected(departed).unwrap_or(0)) };
         self.sent[self.next] = SentTime { index, departed, time, read_only };
         self.next = (self.next + 1) % KEPT;
@@ -364,6 +367,7 @@ mod tests {
                 stands: true,
                 named: None,
                 second_card_ns: None,
+                delays_known: true,
             };
             let mut distribution = SystemTimeDistribution::default();
             distribution.learn(known);
@@ -437,6 +441,19 @@ mod tests {
             }
             // It answers again, and is believed by what it shows.
             assert_eq!(test_line.pass_well(), (FPRD, 0, Brought::Time));
+            assert_eq!(test_line.pass_well().0, FRMW);
+        }
+    }
+
+    #[test]
+    fn while_delays_are_not_known_the_reference_is_asked_and_still_followed() {
+        for mut test_line in test_lines() {
+            test_line.learn(|known| known.delays_known = false);
+            for _ in 0..40 {
+                assert_eq!(test_line.pass_well(), (FPRD, 0, Brought::Time));
+                assert!(test_line.distribution.is_handed());
+            }
+            test_line.learn(|known| known.delays_known = true);
             assert_eq!(test_line.pass_well().0, FRMW);
         }
     }

@@ -110,6 +110,8 @@ pub(crate) struct DeviceTable {
     second_card_ns: Option<i64>,
     /// Until when the ring is open by an order of our own, or may seem to be.
     pub(crate) opened_until: Instant,
+    /// The delays that clocks were told are those of the line as it is; `None` where nobody measures them again.
+    pub(super) delays_known: Option<bool>,
     /// Receive times are being latched and read.
     pub(super) is_latching: bool,
 }
@@ -407,6 +409,10 @@ impl DeviceTable {
         let before = self.responding.replace(responding);
         let states_before = self.states.replace(states);
         let fewer_or_more = before.filter(|before| *before != responding);
+        if fewer_or_more.is_some() && self.delays_known.is_some() {
+            // Frames may travel otherwise than before.
+            self.set_delays_known(false);
+        }
         if fewer_or_more.is_some() || states_before.is_some_and(|before| before != states) {
             self.alert();
         }

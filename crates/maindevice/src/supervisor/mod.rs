@@ -10,6 +10,7 @@ mod align;
 mod by_alias;
 mod clocks;
 pub(crate) mod counters;
+mod delays;
 pub(crate) mod device_supervisor;
 pub(crate) mod device_table;
 mod group_table;
@@ -138,6 +139,8 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
         context.wire.spawn(async move { clocks::set_all(&setting).await });
         if context.plan.tree.closes_at().is_some() {
             context.wire.spawn(open_ring::keep_in_step(context.clone()));
+        } else {
+            context.wire.spawn(delays::keep_measured(context.clone()));
         }
     } else {
         lock(&context.device_table).set_clocks_ready();

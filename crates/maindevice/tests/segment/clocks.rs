@@ -77,7 +77,7 @@ pub(crate) fn start(bench: &mut Bench, plan: Plan) {
 }
 
 /// How far the system times are apart at this moment, seen from outside.
-fn spread(bench: &Bench, plan: &Plan) -> i64 {
+pub(crate) fn spread(bench: &Bench, plan: &Plan) -> i64 {
     let times: Vec<u64> = (plan.devices.iter())
         .filter(|device| device.settings.clock.is_some() || device.id == DeviceId(0))
         .map(|device| bench.segment.controller(device.id).unwrap().system_time(bench.now))

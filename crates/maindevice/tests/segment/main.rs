@@ -6,6 +6,7 @@ mod addressing;
 mod al_errors;
 mod bench;
 mod clocks;
+mod delays;
 mod described;
 mod ethernet;
 mod hot_connect;

@@ -21,11 +21,13 @@ pub(crate) struct ReferenceClock {
     /// While the ring is open: what to add, in ns, to the time that frames of the second card hand round. `None`: they
     /// hand none round.
     pub(crate) second_card_ns: Option<i64>,
+    /// The delays that clocks were told are those of the line as it is: else nobody is given a time.
+    pub(crate) delays_known: bool,
 }
 
 impl Default for ReferenceClock {
     fn default() -> Self {
-        Self { base: None, stands: true, named: None, second_card_ns: None }
+        Self { base: None, stands: true, named: None, second_card_ns: None, delays_known: true }
     }
 }
 
@@ -68,7 +70,8 @@ impl DeviceTable {
         let of_ring = || self.reference.map(|(station, _)| station).filter(|_| self.is_ring);
         let named = if stands { of_ring() } else { self.stand_in() };
         let second_card_ns = self.second_card_ns;
-        ReferenceClock { base: self.clock_base, stands, named, second_card_ns }
+        let delays_known = self.delays_known.unwrap_or(true);
+        ReferenceClock { base: self.clock_base, stands, named, second_card_ns, delays_known }
     }
 
     /// Who gives the time while the reference does not: the first in the order of processing, so that most are
@@ -84,6 +87,13 @@ impl DeviceTable {
     pub(crate) fn with_time(&self) -> impl Iterator<Item = StationAddress> {
         let all = self.devices.iter().zip(&self.stations);
         all.filter(|(live, _)| live.shows_time()).map(|(_, station)| *station)
+    }
+
+    /// Notes whether the delays that clocks were told are those of the line as it is.
+    pub(crate) fn set_delays_known(&mut self, known: bool) {
+        if self.delays_known.replace(known) != Some(known) {
+            self.version.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// Notes what is added to the time in frames of the second card; `None`: they hand none round.
