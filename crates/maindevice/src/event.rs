@@ -137,6 +137,13 @@ pub enum Event {
         /// Station address of the reference clock.
         reference: StationAddress,
     },
+    /// The clock of one SubDevice was set.
+    ClockSet {
+        /// Which one.
+        id: DeviceId,
+        /// True if it counts 64 bits, false if 32.
+        is_wide: bool,
+    },
     /// They could not be set. Those SubDevices that need them are tried again later.
     ClocksNotSet {
         /// Why.

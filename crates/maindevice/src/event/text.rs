@@ -138,6 +138,7 @@ impl Event {
             | Self::GroupLeft { .. }
             | Self::GroupMisplaced { .. }
             | Self::ClockDifference { .. }
+            | Self::ClockSet { .. }
             | Self::NetworkTime { .. }
             | Self::WorkingCounter { .. }
             | Self::WorkingCounterGood { .. }

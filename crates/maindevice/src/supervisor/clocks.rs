@@ -187,6 +187,7 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
         // Who does not answer is found out by its supervisor.
         if set.await.is_ok() {
             lock(&context.device_table).set_clock(id, is_wide);
+            wire.emit(Event::ClockSet { id, is_wide });
         }
     }
     // The cycle follows from now on. It begins anew with the reference alone: who else comes back follows that.
@@ -241,6 +242,7 @@ async fn set_beside(
     let delay = Span::ns(told.saturating_add(later).max(0).unsigned_abs());
     clock::set(wire, clock.station, offset, delay).await?;
     lock(&context.device_table).set_clock(id, clock.is_wide);
+    wire.emit(Event::ClockSet { id, is_wide: clock.is_wide });
     Ok(())
 }
 

@@ -45,6 +45,7 @@ pub struct WatchedDevice {
     code: AlStatusCode,
     found: Option<Identity>,
     wrong_identity: bool,
+    clock_wide: bool,
     init_error: bool,
     links: Option<DlStatus>,
     counters: CounterTotals,
@@ -70,6 +71,7 @@ impl WatchedDevice {
             code: AlStatusCode::NO_ERROR,
             found: None,
             wrong_identity: false,
+            clock_wide: false,
             init_error: false,
             links: None,
             counters: CounterTotals::default(),
@@ -201,6 +203,12 @@ impl WatchedDevice {
         self.clock.map(|(difference, _)| difference)
     }
 
+    /// True if its clock was set, and counts 64 bits.
+    #[must_use]
+    pub fn has_wide_clock(&self) -> bool {
+        self.clock_wide
+    }
+
     /// Whether its clock is out of the window (DC-21).
     #[must_use]
     pub fn is_clock_apart(&self) -> bool {
@@ -278,6 +286,7 @@ impl WatchedDevice {
             Event::Counters { counters, .. } => {
                 self.counters.record(counters);
             }
+            Event::ClockSet { is_wide, .. } => self.clock_wide = *is_wide,
             Event::ClockDifference { difference, apart, .. } => {
                 self.clock = Some((*difference, *apart));
             }
@@ -326,6 +335,7 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::WrongIdentification { id, .. }
         | Event::Counters { id, .. }
         | Event::CountersCleared { id, .. }
+        | Event::ClockSet { id, .. }
         | Event::ClockDifference { id, .. }
         | Event::Identified { id, .. }
         | Event::Links { id, .. }

@@ -28,7 +28,7 @@ use crate::event::Event;
 pub use counters::CounterTotals;
 pub use device::{AbnormalChange, WatchedDevice};
 pub use entry::{EntryKind, LogEntry, Severity};
-pub use group_status::GroupStatus;
+pub use group_status::{GroupRefusal, GroupStatus};
 pub use network_status::NetworkStatus;
 pub use topology::TopologyEntry;
 

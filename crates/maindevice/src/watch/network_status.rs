@@ -10,9 +10,10 @@ use linesman_proto::state::{AlState, NetworkState, StateValue};
 use linesman_proto::time::Instant;
 
 use super::device::concerned;
-use super::group_status::GroupStatus;
+use super::group_status::{GroupRefusal, GroupStatus};
 use super::{CounterTotals, WatchedDevice};
 use crate::event::Event;
+use crate::supervisor::GroupPlace;
 
 /// How the network of a plan stands.
 #[derive(Clone, Debug)]
@@ -149,12 +150,34 @@ impl NetworkStatus {
             }
             Event::GroupJoined { group, place } => {
                 if let Some(group) = self.groups.get_mut(*group) {
-                    (group.joined, group.place) = (true, *place);
+                    (group.joined, group.place, group.refusal) = (true, *place, None);
                 }
             }
             Event::GroupLeft { group } => {
                 if let Some(group) = self.groups.get_mut(*group) {
                     (group.joined, group.place) = (false, None);
+                }
+            }
+            Event::GroupMisplaced { group, place } => {
+                if let Some(group) = self.groups.get_mut(*group) {
+                    group.refusal = Some(GroupRefusal::Place(*place));
+                }
+            }
+            Event::WrongIdentification { id, check, found, .. } => {
+                self.refuse(*id, GroupRefusal::Number { check: *check, found: *found });
+            }
+            Event::IdentificationShared { id, check, count } => {
+                self.refuse(*id, GroupRefusal::Shared { check: *check, count: *count });
+            }
+            // Whoever was plugged in there is pulled.
+            Event::Links { id, status } => {
+                let is_there = |place: Option<GroupPlace>| {
+                    place.is_some_and(|(at, port)| at == *id && !status.port_state(port).link)
+                };
+                for group in &mut self.groups {
+                    if matches!(group.refusal, Some(GroupRefusal::Place(at)) if is_there(at)) {
+                        group.refusal = None;
+                    }
                 }
             }
             Event::NetworkTime { id, ahead_ns } => self.network_time = Some((*id, *ahead_ns)),
@@ -170,6 +193,14 @@ impl NetworkStatus {
             && let Some(device) = self.devices.get_mut(id.index())
         {
             device.handle_event(now, event);
+        }
+    }
+
+    /// What was plugged in for the group with this first SubDevice is not taken.
+    fn refuse(&mut self, first: DeviceId, refusal: GroupRefusal) {
+        let is_its = |group: &&mut GroupStatus| group.members().first() == Some(&first);
+        if let Some(group) = self.groups.iter_mut().find(is_its) {
+            group.refusal = Some(refusal);
         }
     }
 

@@ -1,5 +1,7 @@
 use linesman_config::identity::Mismatch;
-use linesman_config::plan::{DevicePlan, HotConnectGroup};
+use linesman_config::plan::{
+    DevicePlan, HotConnectGroup, IdentificationCheck, IdentificationSource,
+};
 use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
 use linesman_proto::port::Port;
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters, PortState};
@@ -100,7 +102,7 @@ fn groups_stand_last_in_the_topology_list_with_planned_and_present_counts() {
     assert_eq!(watch.network_status().topology_order(), order);
 }
 
-// proves: PLC-10 (U) partial: whether a clock has 64 bits, and groups at wrong ports, are not told there
+// proves: PLC-10 (U)
 #[test]
 fn the_topology_list_has_64_bytes_each_with_neighbours_state_and_counts_of_groups() {
     let mut watch = watch_with_group();
@@ -125,6 +127,37 @@ fn the_topology_list_has_64_bytes_each_with_neighbours_state_and_counts_of_group
     assert_eq!(words(&all[5])[18], 4 | 8 | 16, "there, first of a group, in a group");
     assert_eq!(words(&all[6])[18..22], [16, 0, 2, 1], "not there, in a group");
     assert!(words(&all[6])[10..18].iter().chain(&words(&all[6])[22..]).all(|word| *word == 0));
+}
+
+// proves: PLC-10 (U) partial: clocks of 64 bits, and groups at wrong ports
+#[test]
+fn the_topology_list_tells_clocks_of_64_bits_and_ports_at_which_a_group_may_not_be() {
+    let mut watch = watch_with_group();
+    let status = |watch: &Watch, id: u32| {
+        let list = watch.network_status().topology(watch.plan());
+        list.iter().find(|entry| entry.id == DeviceId(id)).map(|entry| entry.status & 0b1110_0010)
+    };
+    watch.handle_event(at(1), &Event::ClockSet { id: DeviceId(3), is_wide: true });
+    watch.handle_event(at(1), &Event::ClockSet { id: DeviceId(4), is_wide: false });
+    assert_eq!([3, 4].map(|id| status(&watch, id)), [Some(2), Some(0)]);
+    for (port, bits) in [(Port::B, 1 << 5), (Port::C, 1 << 6), (Port::D, 1 << 7)] {
+        let place = Some((DeviceId(6), port));
+        watch.handle_event(at(2), &Event::GroupMisplaced { group: 0, place });
+        assert_eq!(status(&watch, 6), Some(bits));
+    }
+    let group = |watch: &Watch| watch.network_status().groups()[0].refusal();
+    assert_eq!(group(&watch), Some(GroupRefusal::Place(Some((DeviceId(6), Port::D)))));
+    // It is pulled; then it is where it may be.
+    watch.handle_event(at(3), &links(6, &[Port::A]));
+    assert_eq!((status(&watch, 6), group(&watch)), (Some(0), None));
+    let (source, compulsory) = (IdentificationSource::AlStatus, true);
+    let check = IdentificationCheck { source, value: 5, compulsory };
+    let (found, belongs_to) = (Some(7), None);
+    let wrong = Event::WrongIdentification { id: DeviceId(1), check, found, belongs_to };
+    watch.handle_event(at(4), &wrong);
+    assert_eq!(group(&watch), Some(GroupRefusal::Number { check, found }));
+    watch.handle_event(at(5), &Event::GroupJoined { group: 0, place: None });
+    assert_eq!(group(&watch), None);
 }
 
 #[test]

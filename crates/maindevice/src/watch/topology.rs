@@ -7,7 +7,8 @@ use linesman_proto::address::{DeviceId, Position};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::topology::End;
 
-use super::NetworkStatus;
+use super::group_status::{GroupRefusal, GroupStatus};
+use super::{NetworkStatus, WatchedDevice};
 
 /// A SubDevice of the topology list.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -20,7 +21,7 @@ pub struct TopologyEntry {
     pub auto_increment: u16,
     /// Whom the plan has at each port: station address and place; `None`: nobody, or the MainDevice.
     pub neighbours: PortMap<Option<(u16, u16)>>,
-    /// [`TopologyEntry::CLOCK`] to [`TopologyEntry::IN_GROUP`].
+    /// [`TopologyEntry::CLOCK`] to [`TopologyEntry::MISPLACED_AT_B`] and those of C and D.
     pub status: u32,
     /// How many SubDevices of hot connect groups are planned in the network, and how many are there.
     pub group_counts: (u16, u16),
@@ -29,18 +30,21 @@ pub struct TopologyEntry {
 impl TopologyEntry {
     /// Its clock is in use.
     pub const CLOCK: u32 = 1;
+    /// Its clock counts 64 bits.
+    pub const CLOCK_64_BIT: u32 = 1 << 1;
     /// It is there.
     pub const PRESENT: u32 = 1 << 2;
     /// It is the first of a hot connect group.
     pub const GROUP_START: u32 = 1 << 3;
     /// It is in a hot connect group.
     pub const IN_GROUP: u32 = 1 << 4;
+    /// At its port B a hot connect group is plugged in that may not be there; C and D are the next bits.
+    pub const MISPLACED_AT_B: u32 = 1 << 5;
 
     /// Bytes of an entry.
     pub const LEN: usize = 64;
 
-    /// The entry in the vendor's form, little endian. The bits for clocks of 64 bits and for groups at wrong ports stay
-    /// 0: nothing is told of those here.
+    /// The entry in the vendor's form, little endian.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; Self::LEN] {
         let at = |port: Port| self.neighbours[port].unwrap_or_default();
@@ -83,11 +87,31 @@ impl NetworkStatus {
                         group.is_some_and(|group| group.first() == id),
                         TopologyEntry::GROUP_START,
                     )
-                    | bit(group.is_some(), TopologyEntry::IN_GROUP),
+                    | bit(group.is_some(), TopologyEntry::IN_GROUP)
+                    | bit(
+                        self.device(id).is_some_and(WatchedDevice::has_wide_clock),
+                        TopologyEntry::CLOCK_64_BIT,
+                    )
+                    | self.misplaced_at(id),
                 group_counts,
             })
         };
         self.topology_order().into_iter().filter_map(entry).collect()
+    }
+}
+
+impl NetworkStatus {
+    /// The ports of a SubDevice at which groups are that may not be there, as bits of the vendor's form.
+    fn misplaced_at(&self, id: DeviceId) -> u32 {
+        let refusals = self.groups().iter().filter_map(GroupStatus::refusal);
+        refusals.fold(0, |bits, refusal| match refusal {
+            GroupRefusal::Place(Some((at, port))) if at == id && port != Port::A => {
+                bits | TopologyEntry::MISPLACED_AT_B << (port.index() - 1)
+            }
+            GroupRefusal::Place(_) | GroupRefusal::Number { .. } | GroupRefusal::Shared { .. } => {
+                bits
+            }
+        })
     }
 }
 
