@@ -19,6 +19,7 @@ mod many;
 mod network_time;
 mod reference_clock;
 mod ring;
+mod ring_cuts;
 #[allow(clippy::disallowed_macros, reason = "it prints tables for people")]
 mod ring_soak;
 mod robust;
@@ -31,5 +32,6 @@ mod start_up;
 mod synchronisation;
 mod tasks;
 mod timing;
+mod timing_drawn;
 mod watch;
 mod wire_faults;

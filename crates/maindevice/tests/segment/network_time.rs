@@ -437,7 +437,7 @@ fn behind_multiplier(own_ppm: f64) -> String {
     .concat()
 }
 
-// proves: DC-13
+// proves: DC-13 partial: the model has a clock of its own in each network, of one speed
 #[test]
 fn port_multiplier_is_the_reference_clock_of_each_network_behind_it() {
     let mut networks = [-30.0, 45.0].map(|ppm| {

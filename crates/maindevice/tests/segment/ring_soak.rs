@@ -1,5 +1,4 @@
-//! Rings in which much happens: every cable cut and mended at many moments of the cycle, and groups that join and leave
-//! while cables break.
+//! A ring in which much happens: groups join and leave while cables break.
 
 use linesman_config::plan::{
     ClockSettings, DevicePlan, HotConnectGroup, IdentificationCheck, Plan, PlanOptions,
@@ -9,109 +8,13 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::seed::Seed;
-use linesman_sim::segment_file::FaultEntry;
 
 use crate::bench::Bench;
 use crate::hot_connect::source;
-
-const CYCLE: Span = Span::ms(1);
-
-fn cut(bench: &mut Bench, place: &str) -> linesman_sim::truth::FaultId {
-    let entry = FaultEntry::new("link-open".parse().unwrap()).at(place);
-    bench.segment.inject(bench.now, &entry).unwrap()
-}
-
-/// Boxes with inputs and outputs in a ring, and its cables.
-fn boxes(count: usize) -> (String, Vec<String>) {
-    let mut text = "name = \"boxes\"\n".to_owned();
-    let mut cables = Vec::new();
-    let mut on = "maindevice".to_owned();
-    for number in 0..count {
-        text += &format!(
-            "[[device]]\nname = \"B{number}\"\ntype = \"EP2308-0001\"\non = \"{on}\"\ncable_m = 10.0\n"
-        );
-        cables.push(format!("{on}-B{number}.A"));
-        on = format!("B{number}.B");
-    }
-    cables.push(format!("{on}-maindevice.B"));
-    (text + &format!("[ring]\ncloses_at = \"{on}\"\n"), cables)
-}
-
-/// How many events cost no cycle, one, and more.
-type Lost = [u32; 3];
-
-/// Frames of the longest ring here are on their way for less than that.
-const IN_FLIGHT: Span = Span::us(100);
-
-/// When something happens in the cycle: half of the phases are spread over all of it, half over the time in which its frames
-/// are on their way.
-fn moment(phase: u32, phases: u32) -> Span {
-    let half = u64::from(phases / 2);
-    let phase = u64::from(phase);
-    match phase.checked_sub(half) {
-        None => Span::ns(CYCLE.as_nanos() * phase / half),
-        Some(phase) => Span::ns(IN_FLIGHT.as_nanos() * phase / half),
-    }
-}
-
-/// Goes on until so long after the begin of the cycle after the next.
-fn run_into_cycle(bench: &mut Bench, at: Span) {
-    let next = bench.device.next_cycle(0).unwrap();
-    bench.run_for((next + CYCLE + at).since(bench.now));
-}
-
-/// Cuts and mends every cable of a ring at such moments. A cycle is lost when the process data of any
-/// SubDevice are not valid in it.
-fn lost_cycles(count: usize, phases: u32) -> (Lost, Lost) {
-    let (text, cables) = boxes(count);
-    let mut bench = Bench::with_options(&text, Options { ring: true, ..Options::default() });
-    let plan = bench.start(AlState::Op);
-    bench.judged = plan.devices.first().map(|device| device.id);
-    bench.judged_too = plan.devices.iter().map(|device| device.id).collect();
-    let (mut when_cut, mut when_mended) = (Lost::default(), Lost::default());
-    let note = |table: &mut Lost, lost: u64| table[lost.min(2) as usize] += 1;
-    for cable in &cables {
-        for phase in 0..phases {
-            let at = moment(phase, phases);
-            run_into_cycle(&mut bench, at);
-            let before = bench.bad_cycles;
-            let fault = cut(&mut bench, cable);
-            bench.run_for(Span::ms(20));
-            note(&mut when_cut, bench.bad_cycles - before);
-            run_into_cycle(&mut bench, at);
-            let before = bench.bad_cycles;
-            bench.segment.heal(bench.now, fault);
-            let whole =
-                bench.run_until(Span::s(10), |event| matches!(event, Event::Ring { intact: true }));
-            assert!(whole, "{cable}, {phase}");
-            bench.run_for(Span::ms(20));
-            note(&mut when_mended, bench.bad_cycles - before);
-            bench.events.clear();
-        }
-    }
-    println!("SubDevices  phases  event   cycles lost: 0     1  more");
-    for (event, [none, one, more]) in [("cut", when_cut), ("mended", when_mended)] {
-        println!("{count:10}  {phases:6}  {event:6}  {none:14}  {one:4}  {more:4}");
-    }
-    (when_cut, when_mended)
-}
-
-#[test]
-fn every_cable_of_a_ring_cut_and_mended_at_several_phases_costs_one_cycle_at_most() {
-    let (when_cut, when_mended) = lost_cycles(4, 40);
-    assert_eq!((when_cut[2], when_mended[2]), (0, 0), "{when_cut:?} {when_mended:?}");
-    assert_eq!(when_cut.iter().sum::<u32>(), 5 * 40);
-}
-
-#[test]
-#[ignore = "a table for docs/benchmarks.md: minutes"]
-fn table_of_cycles_lost_when_cables_of_a_ring_are_cut_and_mended() {
-    let (when_cut, when_mended) = lost_cycles(50, 100);
-    assert_eq!((when_cut[2], when_mended[2]), (0, 0), "{when_cut:?} {when_mended:?}");
-}
+use crate::ring_cuts::cut;
 
 /// Couplers in a ring, each with a terminal, and two junctions for two tools behind the last one. All clocks come before the
-/// tools: who is behind one that joins gets the time later than it was measured.
+/// tools: in a ring, who is behind one that joins gets the time later than it was measured.
 fn with_tools() -> (String, Vec<String>, [String; 4]) {
     let mut text = "name = \"ring with tools\"\nseed = 3\n".to_owned();
     let mut cables = Vec::new();
