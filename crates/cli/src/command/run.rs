@@ -173,6 +173,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         }
         _ => "what is there".to_owned(),
     };
+    let wanted_gateway = arguments.gateway.wanted(&source)?;
     let setup = (!arguments.no_diagnosis).then(|| Setup {
         input: InputKind::Driven,
         project: match &source {
@@ -244,7 +245,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let mut line = Cards::open(names, clock)?;
             line.set_spin(arguments.spin_us);
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
-            let gateway = arguments.gateway.open(line.wake_handle(), online.clone())?;
+            let gateway = gateway::open(wanted_gateway, line.wake_handle(), online.clone())?;
             let ethernet = arguments.ethernet.open(line.wake_handle())?;
             online.set_ethernet(ethernet.watch());
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
@@ -265,7 +266,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             let pace = if free { Pace::Free } else { Pace::Host };
             let line = line_access::virtual_line(path, pace)?;
             stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
-            let gateway = arguments.gateway.open(line.wake_handle(), online.clone())?;
+            let gateway = gateway::open(wanted_gateway, line.wake_handle(), online.clone())?;
             let ethernet = arguments.ethernet.open(line.wake_handle())?;
             online.set_ethernet(ethernet.watch());
             let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;

@@ -1,5 +1,7 @@
 //! Mailbox gateway of a run: other programs ask SubDevices and the MainDevice by UDP and TCP.
 
+mod protocols;
+
 use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -142,8 +144,7 @@ fn counted(running: &Running, done: impl Fn(&Value) -> bool) -> Value {
     panic!("{last}")
 }
 
-// S0 L3071, L3073: UDP is mandatory, TCP an option; both are there.
-// proves: MBG-02 (S) partial: CoE and VoE, files beside it; SoE is not tried
+// S0 L3073: UDP is mandatory, TCP an option; both are there.
 #[test]
 fn subdevices_answer_by_udp_and_by_tcp() {
     let (running, address) = running(&[]);

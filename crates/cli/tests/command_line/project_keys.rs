@@ -38,6 +38,7 @@ fn place(table: &str) -> Option<(&'static str, &'static str)> {
         "Network" => ("[network]\n", ""),
         "ProjectTask" => ("[[task]]\n", ""),
         "Ring" => ("[ring]\n", ""),
+        "ProjectGateway" => ("[gateway]\n", ""),
         "ProjectDevice" => ("[[device]]\n", ""),
         "ProjectGroup" => ("[[group]]\n", ""),
         "IdentificationChoice" => (device!("identification = { "), " }"),

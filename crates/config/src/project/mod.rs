@@ -20,6 +20,7 @@ mod description;
 mod device;
 pub mod ethernet;
 mod from_esi;
+mod gateway;
 mod group;
 mod resolve;
 mod ring;
@@ -45,6 +46,7 @@ pub use description::{
 };
 pub use device::ProjectDevice;
 pub use ethernet::EthernetChoice;
+pub use gateway::ProjectGateway;
 pub use group::{IdentificationChoice, IdentificationWay, ProjectGroup};
 pub use resolve::{Described, Lookup, ResolveError, Resolved};
 pub use ring::Ring;
@@ -76,6 +78,9 @@ pub struct Project {
     /// Where a second card closes a ring, if it does.
     #[serde(default)]
     pub ring: Option<Ring>,
+    /// The mailbox gateway of its runs, if they have one.
+    #[serde(default)]
+    pub gateway: Option<ProjectGateway>,
 }
 
 /// A project that cannot be used.
@@ -187,7 +192,7 @@ impl Project {
     pub fn of(name: &str, devices: Vec<ProjectDevice>) -> Self {
         let (esi, network, tasks, ring) = (Vec::new(), Network::default(), Vec::new(), None);
         let groups = Vec::new();
-        Self { name: name.to_owned(), esi, network, tasks, devices, groups, ring }
+        Self { name: name.to_owned(), esi, network, tasks, devices, groups, ring, gateway: None }
     }
 
     /// Whether it says more than who is where, and what that is: tasks, settings, descriptions of makers.

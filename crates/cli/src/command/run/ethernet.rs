@@ -2,6 +2,7 @@
 
 use std::net::Ipv4Addr;
 
+use linesman_config::plan::ethernet::Subnet;
 use linesman_link::socket::{TapError, TapInterface, WakeHandle};
 use linesman_maindevice::virtual_switch::SwitchLimits;
 use linesman_runtime::ethernet::{EthernetReport, VirtualEthernet};
@@ -18,7 +19,7 @@ pub(super) struct EthernetArguments {
     eoe: Option<String>,
     /// Switch that interface on with this address and subnet (192.168.1.100/24)
     #[arg(long, value_name = "ADDRESS/BITS", requires = "eoe", value_parser = subnet)]
-    eoe_address: Option<(Ipv4Addr, u8)>,
+    eoe_address: Option<Subnet>,
     /// SubDevices that the virtual switch has ports for
     #[arg(long, value_name = "COUNT", default_value_t = SwitchLimits::default().ports as u32, value_parser = clap::value_parser!(u32).range(1..=65_535))]
     eoe_ports: u32,
@@ -30,13 +31,11 @@ pub(super) struct EthernetArguments {
     eoe_frames: u32,
 }
 
-fn subnet(text: &str) -> Result<(Ipv4Addr, u8), String> {
-    let expected = || {
-        "expected an IPv4 address and the bits of its subnet, 1 to 30: 192.168.1.100/24".to_owned()
-    };
-    let (address, bits) = text.split_once('/').ok_or_else(expected)?;
-    let bits = bits.parse().ok().filter(|bits| (1..=30).contains(bits)).ok_or_else(expected)?;
-    Ok((address.parse().map_err(|_| expected())?, bits))
+/// An address of a subnet that has room for others.
+fn subnet(text: &str) -> Result<Subnet, String> {
+    let subnet: Subnet = text.parse()?;
+    let has_room = subnet.bits <= 30;
+    has_room.then_some(subnet).ok_or_else(|| format!("{subnet}: expected a subnet of 1 to 30 bits"))
 }
 
 impl EthernetArguments {
@@ -63,8 +62,8 @@ impl EthernetArguments {
     fn tap(&self) -> Result<Option<TapInterface>, TapError> {
         let Some(name) = &self.eoe else { return Ok(None) };
         let tap = TapInterface::open(name)?;
-        if let Some((address, bits)) = self.eoe_address {
-            tap.set_address(address, bits)?;
+        if let Some(Subnet { address, bits }) = self.eoe_address {
+            tap.set_address(Ipv4Addr::from(address), bits)?;
             tap.bring_up()?;
         }
         Ok(Some(tap))

@@ -2,11 +2,13 @@
 
 use std::net::SocketAddr;
 
+use linesman_config::project::ProjectGateway;
 use linesman_link::socket::WakeHandle;
 use linesman_proto::mailbox::gateway::PORT;
 use linesman_runtime::gateway::{AllowedHosts, GatewayOptions, GatewayReport, MailboxGateway};
 use linesman_runtime::online::OnlineState;
 
+use super::Source;
 use crate::failure::Failure;
 use crate::text::quantity::count;
 
@@ -34,31 +36,58 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 impl GatewayArguments {
-    /// Opens the gateway, if one is wanted.
-    pub(super) fn open(
-        &self,
-        wake_handle: WakeHandle,
-        online: OnlineState,
-    ) -> Result<Option<MailboxGateway>, Failure> {
-        let Some(listen) = self.gateway else { return Ok(None) };
-        let allowed = self.gateway_allow.clone();
-        let options = GatewayOptions { listen, allowed, read_only: self.gateway_read_only };
-        if options.serves_nobody_else() {
-            return Err(Failure::new(
-                format!(
-                    "--gateway {listen}: it listens for other computers, and none is allowed to ask"
-                ),
-                "name those that are (`--gateway-allow 192.168.1.0/24`), or listen on 127.0.0.1",
-            ));
+    /// How the gateway is to be opened, if one is wanted: as these options say, or else as the project does.
+    pub(super) fn wanted(&self, source: &Source) -> Result<Option<GatewayOptions>, Failure> {
+        if let Some(listen) = self.gateway {
+            let allowed = self.gateway_allow.clone();
+            return Ok(Some(GatewayOptions { listen, allowed, read_only: self.gateway_read_only }));
         }
-        let gateway = MailboxGateway::open(options, wake_handle, online).map_err(|error| {
-            Failure::new(
-                format!("--gateway {listen}: opening UDP and TCP port {}: {error}", listen.port()),
-                "name an address of this computer (`ip address`) and a port that nobody uses (`ss -lntu`)",
-            )
-        })?;
-        Ok(Some(gateway))
+        let project = match source {
+            Source::Project(project) | Source::Planned(_, Some(project)) => project,
+            Source::AsFound | Source::Planned(_, None) => return Ok(None),
+        };
+        let Some(ProjectGateway { listen, allow, read_only }) = &project.gateway else {
+            return Ok(None);
+        };
+        let wrong = |key: &str, text: &str, why: String| {
+            let reason = format!("`{key} = \"{text}\"` in [gateway] of the project: {why}");
+            Failure::new(reason, "correct it, or take the table out and use `--gateway`")
+        };
+        let allowed = allow
+            .iter()
+            .map(|text| text.parse::<AllowedHosts>().map_err(|why| wrong("allow", text, why)));
+        Ok(Some(GatewayOptions {
+            listen: address(listen).map_err(|why| wrong("listen", listen, why))?,
+            allowed: allowed.collect::<Result<_, _>>()?,
+            read_only: *read_only,
+        }))
     }
+}
+
+/// Opens the gateway, if one is wanted.
+pub(super) fn open(
+    options: Option<GatewayOptions>,
+    wake_handle: WakeHandle,
+    online: OnlineState,
+) -> Result<Option<MailboxGateway>, Failure> {
+    let Some(options) = options else { return Ok(None) };
+    let listen = options.listen;
+    if options.serves_nobody_else() {
+        return Err(Failure::new(
+            format!(
+                "--gateway {listen}: it listens for other computers, and none is allowed to ask"
+            ),
+            "name those that are (`--gateway-allow 192.168.1.0/24`, `allow` in [gateway] of a project), or listen on \
+             127.0.0.1",
+        ));
+    }
+    let gateway = MailboxGateway::open(options, wake_handle, online).map_err(|error| {
+        Failure::new(
+            format!("--gateway {listen}: opening UDP and TCP port {}: {error}", listen.port()),
+            "name an address of this computer (`ip address`) and a port that nobody uses (`ss -lntu`)",
+        )
+    })?;
+    Ok(Some(gateway))
 }
 
 /// Where it listens, for people.
