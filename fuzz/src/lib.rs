@@ -11,6 +11,7 @@ mod device_builder;
 mod diagnosis;
 mod eni;
 mod esi;
+mod ethernet;
 mod frame;
 mod gateway;
 mod mailbox;
@@ -30,6 +31,7 @@ pub use device_builder::device_builder;
 pub use diagnosis::diagnosis;
 pub use eni::eni;
 pub use esi::esi;
+pub use ethernet::ethernet;
 pub use frame::frame;
 pub use gateway::gateway;
 pub use mailbox::mailbox;
@@ -53,6 +55,7 @@ pub const TARGETS: &[Target] = &[
     ("diagnosis", diagnosis),
     ("eni", eni),
     ("esi", esi),
+    ("ethernet", ethernet),
     ("frame", frame),
     ("gateway", gateway),
     ("mailbox", mailbox),

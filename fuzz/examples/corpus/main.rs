@@ -20,8 +20,10 @@ use linesman_proto::sii::{
     SyncManager,
 };
 
+mod ethernet;
 mod texts;
 
+use ethernet::ethernet_messages;
 use texts::{bundles, observation_files, pasted_texts};
 
 type Made = Vec<(&'static str, Vec<u8>)>;
@@ -41,6 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("device_builder", [images()?, descriptions()].concat()),
         ("esi", descriptions()),
         ("sii", images()?),
+        ("ethernet", ethernet_messages()?),
         ("gateway", gateway_frames()),
         ("mailbox", messages().into_iter().chain(conversations()).collect()),
         ("mailbox_client", hostile()),
