@@ -14,7 +14,7 @@
 //! | 4 | count of the outputs: odd while they are being written |
 //! | 5 | cycles so far |
 //! | 6 | time of the run, in ns |
-//! | 7 | bit 0: every SubDevice is in its target state; bit 1: outputs are withheld; bit 2: the run has ended |
+//! | 7 | bit 0: every SubDevice is in its target state; bit 1: outputs are withheld; bit 2: the run has ended; of a ring bits 32 to 47: SubDevices counted in what card A receives, bits 48 to 63: card B (0 without a ring) |
 //! | 8 | how many SubDevices there are in the low half, state word of the network in the high half (PLC-07; 0: all is well) |
 //!
 //! The states are words of two bytes, one for each SubDevice in the order of their numbers: software in the
@@ -66,6 +66,8 @@ pub struct ImageState {
     pub ended: bool,
     /// State word of the network.
     pub network: u16,
+    /// How many SubDevices are counted in what each card of a ring receives, card A first; 0 without a ring.
+    pub responding_by_card: [u16; 2],
 }
 
 /// A mapped image.
@@ -225,8 +227,9 @@ impl SharedImage {
             self.word(CYCLES).store(state.cycles, Ordering::Relaxed);
             self.word(TIME).store(state.time_ns, Ordering::Relaxed);
             let bits = [state.settled, state.withheld, state.ended];
-            let bits = bits.iter().rev().fold(0, |sum, bit| sum << 1 | u64::from(*bit));
-            self.word(STATE).store(bits, Ordering::Relaxed);
+            let bits = bits.iter().rev().fold(0, |sum, bit| sum << 1 | u32::from(*bit));
+            let [a, b] = state.responding_by_card.map(u32::from);
+            self.word(STATE).store(pair(bits, b << 16 | a), Ordering::Relaxed);
         });
     }
 
@@ -235,7 +238,7 @@ impl SharedImage {
         self.read(INPUTS_COUNT, || {
             copy_out(self.inputs_words(), inputs);
             let load = |at: usize| self.word(at).load(Ordering::Relaxed);
-            let bits = load(STATE);
+            let (bits, cards) = halves(load(STATE));
             ImageState {
                 cycles: load(CYCLES),
                 time_ns: load(TIME),
@@ -243,6 +246,7 @@ impl SharedImage {
                 withheld: bits & 2 != 0,
                 ended: bits & 4 != 0,
                 network: halves(load(STATES)).1 as u16,
+                responding_by_card: [cards as u16, (cards >> 16) as u16],
             }
         })
         .map(|(state, _)| state)
@@ -366,6 +370,7 @@ mod tests {
                 assert_eq!(state.network, state.cycles as u16);
                 seen += 1;
                 if state.ended {
+                    assert_eq!(state.responding_by_card, [2, 0x8001]);
                     theirs.write_outputs(&[1, 2, 3, 4, 5]);
                     return seen;
                 }
@@ -382,6 +387,7 @@ mod tests {
             ended: true,
             settled: true,
             network: 7,
+            responding_by_card: [2, 0x8001],
             ..ImageState::default()
         };
         ours.publish(&[7; 1_003], &ended, [(5, 0x2408)]);
