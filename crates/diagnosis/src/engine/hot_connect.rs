@@ -2,9 +2,11 @@
 //!
 //! A group that is unplugged is to the rules a link that was lost with all behind it, and one that is plugged in
 //! has been without power. What a project allows to be absent is not reported as gone. Damage within a group,
-//! errors at its ports and wrong states stay findings.
+//! errors at its ports, wrong states, and SubDevices that start anew while the first one of their group goes on stay
+//! findings.
 
 use linesman_proto::address::DeviceId;
+use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 
 use crate::finding::{Condition, Place, Symptom};
@@ -12,6 +14,13 @@ use crate::model::NetworkModel;
 
 /// Links without contact, controllers that do not answer, restarts, missing working counters.
 const OF_ABSENCE: [&str; 7] = ["H101", "H102", "H105", "H150", "S205", "S210", "H104"];
+
+/// Of these the ones that tell that power was away.
+const RESTARTS: [&str; 2] = ["H150", "S205"];
+
+/// A group that was plugged in is seen to have started anew so long after its first SubDevice answers: addresses are given
+/// and states read only after a search.
+const AFTER: Span = Span::s(3);
 
 /// Takes out what tells only that groups are absent, or have come.
 pub(super) fn excuse(model: &NetworkModel, conditions: &mut Vec<Condition>) {
@@ -26,6 +35,9 @@ fn is_of_absence(model: &NetworkModel, condition: &Condition) -> bool {
     }
     match condition.place {
         Place::Link { a, b, .. } => leads_to_group(model, a, b),
+        Place::Device { device, .. } if RESTARTS.contains(&condition.page.code) => {
+            restarted_with_group(model, device)
+        }
         Place::Device { device, .. } => goes_with_group(model, device),
         // Of the network as a whole: whose shares are missing tells; nobody knows those of a group that has not been
         // set up yet.
@@ -61,6 +73,24 @@ fn goes_with_group(model: &NetworkModel, id: DeviceId) -> bool {
     is_absent(model, *first)
         || id == *first
         || model.device(id).is_some_and(|one| one.silent.is_none())
+}
+
+/// True if a controller started anew with its group, as when that was plugged in: its first one had gone by then, and
+/// had not been back for long.
+fn restarted_with_group(model: &NetworkModel, id: DeviceId) -> bool {
+    let Some(first) = model.optional.get(&id) else { return false };
+    if id == *first || is_absent(model, *first) {
+        return true;
+    }
+    let fell = model.device(id).and_then(|one| {
+        one.al.changes.iter().filter(|change| change.is_own_fall()).map(|change| change.at).last()
+    });
+    let (Some(fell), Some(first)) = (fell, model.device(*first)) else {
+        return goes_with_group(model, id);
+    };
+    first.joined_absences().iter().any(|absence| {
+        absence.since.at <= fell && absence.ended.is_none_or(|ended| ended + AFTER >= fell)
+    })
 }
 
 /// Whether a controller does not answer, or never did.
