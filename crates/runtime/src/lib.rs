@@ -6,7 +6,7 @@
 //! interfaces: [`wiring`] brings its outputs to its inputs, [`control`] breaks and heals it from
 //! outside, [`truth_writer`] writes down what really happened, [`names`] says where. [`plan_file`] reads
 //! the file that a line is planned with, [`named_files`] the files that a file names. [`gateway`] passes mailbox messages
-//! of other programs to a line that runs, [`ethernet`] frames between its SubDevices and an interface of this computer. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop,
+//! of other programs to a line that runs, [`ethernet`] frames between its SubDevices and an interface of this computer. [`service_session`] serves a line that nobody drives. [`stop`] is the wish to stop, [`wait`] waits for a person at the line,
 //! [`part`] says that a part of a command has failed.
 
 pub mod bundle;
@@ -38,5 +38,6 @@ pub mod stop;
 pub mod system_log;
 pub mod transport;
 pub mod truth_writer;
+pub mod wait;
 mod watched_file;
 pub mod wiring;

@@ -2,7 +2,9 @@
 
 use linesman_config::plan::Plan;
 use linesman_diagnosis::Diagnosis;
+use linesman_maindevice::watch::{GroupRefusal, NetworkStatus};
 use linesman_maindevice::{MainDevice, Statistics};
+use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};
 use serde::{Deserialize, Serialize};
 
@@ -55,11 +57,51 @@ pub struct RunReport {
     /// What went through the virtual switch; `null`: no SubDevice speaks EoE, and no interface was wanted.
     #[serde(default)]
     pub ethernet: Option<EthernetReport>,
+    /// Hot connect groups that were plugged in and are kept in INIT, each with the reason and the next step.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_taken: Vec<String>,
     /// Parts of this program that failed while the line was driven on, each with the reason and the next step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failed: Vec<String>,
     /// What was wrong with the line; `null` while it runs, and where it was not judged.
     pub diagnosis: Option<Diagnosis>,
+}
+
+/// Groups that are not taken, in words: who, why, what to do.
+pub(super) fn not_taken(plan: &Plan, status: &NetworkStatus) -> Vec<String> {
+    let name = |id: DeviceId| plan.device(id).map_or_else(|| id.to_string(), |it| it.name.clone());
+    let groups = status.groups().iter();
+    let refused = groups.filter_map(|group| Some((group, group.refusal()?)));
+    refused
+        .map(|(group, refusal)| {
+            let (why, step) = match refusal {
+                GroupRefusal::Number { check, found } => {
+                    let found = found.map_or_else(|| "none".to_owned(), |found| found.to_string());
+                    (
+                        format!(
+                            "must tell the number {} ({}), found {found}",
+                            check.value, check.source
+                        ),
+                        "set the number at the device, or plug in the group that has it",
+                    )
+                }
+                GroupRefusal::Shared { check, count } => (
+                    format!("{count} tell its number {} ({})", check.value, check.source),
+                    "give each a number of its own",
+                ),
+                GroupRefusal::Place(place) => (
+                    match place {
+                        Some((id, port)) => {
+                            format!("may not be plugged in at port {port} of {}", name(id))
+                        }
+                        None => "may not be plugged in where it is".to_owned(),
+                    },
+                    "plug it in at one of its `places`, or add that port to them",
+                ),
+            };
+            format!("hot connect group {}: {why}; it is kept in INIT. Do: {step}", group.name())
+        })
+        .collect()
 }
 
 /// A SubDevice of a running plan.

@@ -19,7 +19,7 @@ use super::diagnosis_input::RunDiagnosis;
 use super::diagnosis_thread::DiagnosisObserver;
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
-use super::report::{Counts, RunReport, SCHEMA, of_plan};
+use super::report::{Counts, RunReport, SCHEMA, not_taken, of_plan};
 use crate::ethernet::VirtualEthernet;
 use crate::gateway::MailboxGateway;
 use crate::part::PartFailure;
@@ -131,6 +131,11 @@ impl<A: Application> RunSession<A> {
             host: (&self.granted).into(),
             gateway: self.gateway.as_ref().map(MailboxGateway::report),
             ethernet: self.ethernet.as_ref().and_then(VirtualEthernet::report),
+            not_taken: self
+                .run
+                .plan()
+                .zip(main.network_status())
+                .map_or_else(Vec::new, |(plan, status)| not_taken(plan, status)),
             failed: Vec::new(),
             diagnosis: None,
         }

@@ -52,6 +52,7 @@ impl Application for Shared {
             withheld: io.is_withheld(),
             ended: false,
             network: io.network_state().0,
+            responding_by_card: io.responding_by_card().unwrap_or_default(),
         };
         let count = image.devices();
         let first = self.next;
