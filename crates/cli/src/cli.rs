@@ -163,9 +163,9 @@ impl Command {
             Self::Counters(arguments) => arguments.json,
             Self::Probe(arguments) => arguments.json,
             Self::Explain(arguments) => arguments.json,
-            Self::Demo(_) | Self::Id(_) | Self::Ring(_) | Self::Schema(_) | Self::Completion(_) => {
-                false
-            }
+            Self::Id(arguments) => arguments.json,
+            Self::Ring(arguments) => arguments.json,
+            Self::Demo(_) | Self::Schema(_) | Self::Completion(_) => false,
         }
     }
 }

@@ -13,13 +13,15 @@ use linesman_proto::register::{self, AlControl, AlStatus};
 use linesman_proto::sii::Identification;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
+use serde::Serialize;
 
-use super::service::ServiceLine;
+use super::service::{DeviceReport, ServiceLine};
 use super::sii;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files::{self, Planned};
 use crate::output::{Output, Table};
+use crate::version;
 
 /// So often it is looked whether a SubDevice has loaded its number, and so long between.
 const LOOKS: usize = 20;
@@ -44,6 +46,51 @@ pub(crate) struct Arguments {
     /// Compare with this project
     #[arg(long, value_name = "machine.toml")]
     against: Option<PathBuf>,
+    /// JSON, schema linesman.numbers/1; with --set linesman.sii/1, and linesman.refusal/1 when it is refused
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// The numbers of SubDevices.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Report {
+    /// `linesman.numbers/1`.
+    schema: String,
+    /// Name and version of the program.
+    tool: String,
+    /// By number.
+    devices: Vec<NumbersReport>,
+    /// Whether another process drives the line: selectors that have to be asked for are not read then.
+    driven: bool,
+    /// What differs from the project, each with what to do; `null` without --against.
+    differences: Option<Vec<NumberDifference>>,
+}
+
+/// The numbers that a SubDevice tells.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct NumbersReport {
+    /// Whose.
+    device: DeviceReport,
+    /// How its selector is read: `at 0x1000`, `by AL control`; `null`: it has none.
+    read: Option<String>,
+    /// What the selector tells; `null`: nothing.
+    selector: Option<u16>,
+    /// Its station alias; `null`: none.
+    alias: Option<u16>,
+    /// Its serial number; `null`: none.
+    serial: Option<u32>,
+}
+
+/// A number that is not as planned.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct NumberDifference {
+    /// Whose number, what it must be and what it is.
+    reason: String,
+    /// What to do.
+    next_step: String,
 }
 
 /// The numbers that a SubDevice tells.
@@ -58,6 +105,15 @@ struct ToldNumbers {
 }
 
 impl ToldNumbers {
+    /// How its selector is read, in words; `None` where it has none.
+    fn read(&self) -> Option<String> {
+        match self.how {
+            Identification::None => None,
+            Identification::AlStatus => Some("by AL control".to_owned()),
+            Identification::Memory(at) => Some(format!("at 0x{:04X}", at.0)),
+        }
+    }
+
     /// The number that it tells in one way; 0 is none.
     fn by(&self, way: IdentificationWay) -> u32 {
         match way {
@@ -88,24 +144,51 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for id in ids.into_iter().filter(|id| one.is_none_or(|one| one == *id)) {
         told.push(read(&mut session, id)?);
     }
-    output.text(&table(&told, output));
-    if session.inventory().is_none() {
-        output.line(
-            "Another process drives this line: selectors that have to be asked for are not read.",
-        );
+    let wrong = project.as_ref().map(|project| compare(project, &told, one));
+    if arguments.json {
+        output.json(&report(&session, &told, wrong.as_deref()));
+    } else {
+        output.text(&table(&told, output));
+        if session.inventory().is_none() {
+            output.line(
+                "Another process drives this line: selectors that have to be asked for are not read.",
+            );
+        }
     }
-    let Some(project) = project else {
-        propose(&told, output);
+    let Some(wrong) = wrong else {
+        if !arguments.json {
+            propose(&told, output);
+        }
         return Ok(Status::Good);
     };
-    let wrong = compare(&project, &told, one);
     for failure in &wrong {
         output.complain(failure);
     }
-    if wrong.is_empty() {
+    if wrong.is_empty() && !arguments.json {
         output.line("All numbers are as planned.");
     }
     Ok(if wrong.is_empty() { Status::Good } else { Status::Findings })
+}
+
+fn report(session: &ServiceLine, told: &[ToldNumbers], wrong: Option<&[Failure]>) -> Report {
+    let devices = told.iter().map(|one| NumbersReport {
+        device: session.report(one.id),
+        read: one.read(),
+        selector: one.selector,
+        alias: Some(one.alias).filter(|alias| *alias != 0),
+        serial: Some(one.serial).filter(|serial| *serial != 0),
+    });
+    let difference = |failure: &Failure| NumberDifference {
+        reason: failure.reason.clone(),
+        next_step: failure.next_step.clone(),
+    };
+    Report {
+        schema: "linesman.numbers/1".to_owned(),
+        tool: version::tool(),
+        devices: devices.collect(),
+        driven: session.inventory().is_none(),
+        differences: wrong.map(|wrong| wrong.iter().map(difference).collect()),
+    }
 }
 
 /// Reads the number of a SubDevice in each way.
@@ -163,11 +246,7 @@ fn table(told: &[ToldNumbers], output: &Output) -> String {
     let mut table =
         Table::new(&["no", "SubDevice", "selector", "read", "alias", "serial"], output.paint());
     for one in told {
-        let how = match one.how {
-            Identification::None => "has none".to_owned(),
-            Identification::AlStatus => "by AL control".to_owned(),
-            Identification::Memory(at) => format!("at 0x{:04X}", at.0),
-        };
+        let how = one.read().unwrap_or_else(|| "has none".to_owned());
         let number = |value: u32| if value == 0 { "-".to_owned() } else { value.to_string() };
         table.row([
             one.id.no().to_string(),
@@ -307,6 +386,9 @@ fn set(
         ));
     }
     let done = sii::set_alias(session, id, value, arguments.backup.as_deref(), output);
-    let outcome = done.map(|report| output.text(&report.text(&session.label(id), output)));
-    super::service::end(outcome, false, output)
+    let outcome = done.map(|report| match arguments.json {
+        true => output.json(&report),
+        false => output.text(&report.text(&session.label(id), output)),
+    });
+    super::service::end(outcome, arguments.json, output)
 }

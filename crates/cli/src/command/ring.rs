@@ -3,9 +3,10 @@
 //!
 //! Source: S0 L1106-1113.
 
+pub(crate) mod report;
+
 use std::path::{Path, PathBuf};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use linesman_config::fault::FaultName;
 use linesman_config::inventory::Inventory;
@@ -13,7 +14,7 @@ use linesman_config::plan::{Plan, PlanOptions};
 use linesman_config::project::Project;
 use linesman_link::clock::HostClock;
 use linesman_link::interface;
-use linesman_proto::address::Path as CardPath;
+use linesman_proto::address::{DeviceId, Path as CardPath};
 use linesman_proto::port::Port;
 use linesman_proto::sii::PortKind;
 use linesman_proto::state::AlState;
@@ -22,9 +23,11 @@ use linesman_proto::topology::End;
 use linesman_runtime::run::{scan, scan::PATIENCE};
 use linesman_runtime::selector::Selector;
 use linesman_runtime::transport::{Cards, Pace, SegmentTransport};
+use linesman_runtime::wait::look_until;
 use linesman_runtime::wiring::Wiring;
 use linesman_sim::segment_file::FaultEntry;
 
+use self::report::{Report, RingCable, RingTrouble, StepTeller, cables};
 use super::line_access;
 use crate::amount;
 use crate::exit::Status;
@@ -32,9 +35,7 @@ use crate::failure::Failure;
 use crate::files;
 use crate::output::Output;
 use crate::text::quantity::count;
-
-/// How often it is looked whether a cable is plugged or pulled.
-const LOOK: Duration = Duration::from_millis(200);
+use crate::version;
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -52,6 +53,9 @@ pub(crate) struct Arguments {
     /// Write what was found as a project with its ring, for `linesman run`
     #[arg(long, value_name = "machine.toml")]
     save: Option<PathBuf>,
+    /// JSON, schema linesman.ring/1; the steps go to standard error
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// A port of a SubDevice, by its place in the order of processing.
@@ -173,11 +177,12 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         line_access::refuse(names)?;
     }
     let patience = Duration::from_secs(arguments.wait);
-    output.line(&format!("Step 1 of 4: scan with the ring open, by {first}"));
-    wait_until_open(&site, patience, output)?;
+    let mut told = StepTeller { json: arguments.json, output };
+    told.line(&format!("Step 1 of 4: scan with the ring open, by {first}"));
+    wait_until_open(&site, patience, &mut told)?;
     let line = site.scan_line()?;
     let last = line.devices.last().map(|device| device.label()).unwrap_or_default();
-    output.line(&format!(
+    told.line(&format!(
         "  {} found, the last one {last}",
         count(line.devices.len() as u64, "SubDevice")
     ));
@@ -192,21 +197,38 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         })?,
     };
     let end = written(&line, wanted);
-    output.line(&format!("Step 2 of 4: plug a cable from {end} into {second}"));
+    told.line(&format!("Step 2 of 4: plug a cable from {end} into {second}"));
     let ring = wait_until_closed(&site, line.devices.len(), patience)?;
-    output.line(&format!("  {second} receives what {first} sends: the ring is closed"));
-    output.line("Step 3 of 4: its end");
+    told.line(&format!("  {second} receives what {first} sends: the ring is closed"));
+    told.line("Step 3 of 4: its end");
     let closes_at = ring.tree().closes_at();
     let found = closes_at.map(|end| written(&ring, end)).unwrap_or_default();
-    output.line(&format!("  it closes at {found}"));
+    told.line(&format!("  it closes at {found}"));
     let wrong = wrong_end(&ring, closes_at, wanted, &end).or_else(|| others(&line, &ring));
+    let mut report = Report {
+        schema: "linesman.ring/1".to_owned(),
+        tool: version::tool(),
+        on: arguments.place.clone(),
+        devices: ring.devices.len() as u32,
+        expected_end: numbered(wanted),
+        end: closes_at.map(numbered),
+        wrong: None,
+        cables: Vec::new(),
+        saved: None,
+    };
     if let Some(wrong) = wrong {
-        output.complain(&wrong);
+        report.wrong =
+            Some(RingTrouble { reason: wrong.reason.clone(), next_step: wrong.next_step.clone() });
+        told.output.complain(&wrong);
+        if arguments.json {
+            told.output.json(&report);
+        }
         return Ok(Status::Findings);
     }
-    output.line("Step 4 of 4: checked");
-    for text in checked(&ring) {
-        output.line(&format!("  {text}"));
+    told.line("Step 4 of 4: checked");
+    report.cables = plan(&ring).map(|plan| cables(&plan)).unwrap_or_default();
+    for text in checked(&ring, &report.cables) {
+        told.line(&format!("  {text}"));
     }
     let next = match &arguments.save {
         Some(path) => {
@@ -216,12 +238,16 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
                 "the project",
                 &Project::from_inventory(&name, &ring).to_toml(),
             )?;
-            output.line(&format!("Saved as {}.", path.display()));
+            report.saved = Some(path.display().to_string());
+            told.line(&format!("Saved as {}.", path.display()));
             format!("linesman run {} --on {}", path.display(), arguments.place)
         }
         None => format!("linesman ring {} --save machine.toml", arguments.place),
     };
-    output.line(&format!("Next: {next}"));
+    told.line(&format!("Next: {next}"));
+    if arguments.json {
+        told.output.json(&report);
+    }
     Ok(Status::Good)
 }
 
@@ -236,23 +262,22 @@ fn is_closed(inventory: &Inventory) -> bool {
 fn wait_until_open(
     site: &RingSite,
     patience: Duration,
-    output: &mut Output,
+    told: &mut StepTeller<'_>,
 ) -> Result<(), Failure> {
     let RingSite::Cards([_, second]) = site else { return Ok(()) };
-    let until = Instant::now() + patience;
     let mut is_told = false;
-    // Nobody, or another line, is no closed ring; the scan tells.
-    while site.scan_ring().is_ok_and(|inventory| is_closed(&inventory)) {
-        if !std::mem::replace(&mut is_told, true) {
-            output.line(&format!("  the ring is closed: pull the cable out of {second}"));
+    let is_open = look_until(patience, || {
+        // Nobody, or another line, is no closed ring; the scan tells.
+        let is_open = !site.scan_ring().is_ok_and(|inventory| is_closed(&inventory));
+        if !is_open && !std::mem::replace(&mut is_told, true) {
+            told.line(&format!("  the ring is closed: pull the cable out of {second}"));
         }
-        if Instant::now() >= until {
-            let reason = format!("{second}: its cable is still plugged in: the ring is closed");
-            return Err(Failure::new(reason, format!("pull it out of {second}, and begin again")));
-        }
-        thread::sleep(LOOK);
-    }
-    Ok(())
+        is_open.then_some(())
+    });
+    is_open.ok_or_else(|| {
+        let reason = format!("{second}: its cable is still plugged in: the ring is closed");
+        Failure::new(reason, format!("pull it out of {second}, and begin again"))
+    })
 }
 
 /// Waits until the ring is closed; what is still wrong when the time is up.
@@ -261,16 +286,18 @@ fn wait_until_closed(
     expected: usize,
     patience: Duration,
 ) -> Result<Inventory, Failure> {
-    let until = Instant::now() + patience;
-    loop {
-        let ring = site.scan_ring()?;
-        if is_closed(&ring) {
-            return Ok(ring);
+    let mut last = None;
+    let closed = look_until(patience, || match site.scan_ring() {
+        Ok(ring) if !is_closed(&ring) => {
+            last = Some(ring);
+            None
         }
-        if Instant::now() >= until {
-            return Err(still_open(site, expected, &ring));
-        }
-        thread::sleep(LOOK);
+        ended => Some(ended),
+    });
+    match (closed, last) {
+        (Some(ended), _) => ended,
+        (None, Some(ring)) => Err(still_open(site, expected, &ring)),
+        (None, None) => site.scan_ring(),
     }
 }
 
@@ -378,6 +405,11 @@ fn written(inventory: &Inventory, (node, port): RingEnd) -> String {
     format!("port {port} of {label}")
 }
 
+/// As on the command line: `9.B`.
+fn numbered((node, port): RingEnd) -> String {
+    format!("{}.{port}", node + 1)
+}
+
 /// An end that is not the one that was named, or not a legal one.
 fn wrong_end(
     ring: &Inventory,
@@ -420,14 +452,16 @@ fn plan(inventory: &Inventory) -> Option<Plan> {
 }
 
 /// What the ring protects, and what not.
-fn checked(ring: &Inventory) -> Vec<String> {
-    let Some(plan) = plan(ring) else { return Vec::new() };
-    let cables = plan.cables();
+fn checked(ring: &Inventory, cables: &[RingCable]) -> Vec<String> {
+    if cables.is_empty() {
+        return Vec::new();
+    }
     let safe = cables.iter().filter(|cable| cable.may_break).count() as u64;
     let verb = if safe == 1 { "breaks" } else { "break, one at a time" };
     let mut told = vec![format!("nobody is lost when {} {verb}", count(safe, "cable"))];
     for cable in cables.iter().filter(|cable| !cable.may_break) {
-        let lost: Vec<String> = cable.lost.iter().map(|id| ring.label(*id)).collect();
+        let ids = cable.lost.iter().filter_map(|no| DeviceId::from_no(*no));
+        let lost: Vec<String> = ids.map(|id| ring.label(id)).collect();
         told.push(format!(
             "a cable outside of the ring: without it {} lost",
             match lost.as_slice() {

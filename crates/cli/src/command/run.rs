@@ -470,7 +470,7 @@ fn drive<L: Transport<Error = LinkError> + Send>(
     }
     let faulty =
         report.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
-    Ok(if faulty || report.reached_ns.is_none() {
+    Ok(if faulty || report.reached_ns.is_none() || !report.not_taken.is_empty() {
         Status::Findings
     } else if report.counts.undiagnosed > 0 {
         Status::Inconclusive

@@ -24,7 +24,9 @@ use super::log::LogReport;
 use super::plan::report::PlanReport;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
-use super::{capture, counters, explain, foe, history, host, probe, reg, service, sii, state};
+use super::{
+    capture, counters, explain, foe, history, host, id, probe, reg, ring, service, sii, state,
+};
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
 use crate::output::Output;
@@ -100,6 +102,10 @@ pub(crate) enum Name {
     Host,
     /// `explain --json`
     Explain,
+    /// `ring --json`
+    Ring,
+    /// `id --json`
+    Numbers,
     /// `state --json`
     States,
     /// `sdo … read|write --json`
@@ -162,6 +168,8 @@ fn schema(name: Name) -> Schema {
         Name::Interfaces => schema_for!(interfaces::Report),
         Name::Host => schema_for!(host::Report),
         Name::Explain => schema_for!(explain::Report),
+        Name::Ring => schema_for!(ring::report::Report),
+        Name::Numbers => schema_for!(id::Report),
         Name::States => schema_for!(state::Report),
         Name::Sdo => schema_for!(ReadReport),
         Name::Objects => schema_for!(ListReport),

@@ -119,9 +119,31 @@ fn run_tells_that_a_group_joins_and_leaves_and_finds_nothing_wrong_with_it() {
 fn run_names_a_wrong_number_with_what_to_do() {
     let machine = Machine::new(GROUP);
     let run = machine.run(&PLANT.replace("id = 5", "id = 7"), &["--for", "2"]);
-    for said in ["must be 5, found 7; it is kept in INIT", "Do: set the number at the device"] {
+    for said in [
+        "must be 5, found 7; it is kept in INIT",
+        "Do: set the number at the device",
+        "Not taken: hot connect group tool: must tell the number 5",
+    ] {
         assert!(run.stdout.contains(said), "{said}: {}", run.all());
     }
+    assert_eq!(run.status, 1, "a wrong number is a finding: {}", run.all());
+    let run = machine.run(&PLANT.replace("id = 5", "id = 7"), &["--for", "2", "--json"]);
+    let report = run.json();
+    assert_valid(&report, "run");
+    assert_eq!(report["not_taken"].as_array().unwrap().len(), 1, "{}", run.all());
+}
+
+#[test]
+fn supply_that_dips_within_a_group_that_is_there_is_a_finding() {
+    let machine = Machine::new(GROUP);
+    let dip = "[[fault]]\nkind = \"device-off\"\ndevice = \"X1\"\nfrom_ms = 3000\nto_ms = 3200\n";
+    let run = machine.run(&format!("{PLANT}{dip}"), &["--for", "7", "--json"]);
+    let report = run.json();
+    let findings = report["diagnosis"]["findings"].as_array().unwrap();
+    let is_it =
+        |finding: &serde_json::Value| finding["code"] == "H150" && finding["place"]["no"] == 5;
+    assert!(findings.iter().any(is_it), "{findings:#?}");
+    assert_eq!(run.status, 1, "{findings:#?}");
 }
 
 #[test]

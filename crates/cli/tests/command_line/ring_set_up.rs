@@ -3,8 +3,8 @@
 use std::fs;
 
 use crate::support::bench::beside_segment;
-use crate::support::linesman;
 use crate::support::running::Running;
+use crate::support::{assert_valid, linesman};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -143,6 +143,20 @@ fn a_virtual_ring_is_set_up_and_planned() {
     }
     let run = linesman(["plan", saved.to_str().unwrap(), "--json"]);
     assert_eq!(run.json()["cables"].as_array().unwrap().len(), 6, "{}", run.all());
+    let run = linesman(["ring", &on, "--end", "4.C", "--json"]);
+    let report = run.json();
+    assert_valid(&report, "ring");
+    assert_eq!((run.status, &report["wrong"], &report["end"]), (0, &json!(null), &json!("4.C")));
+    let cables = report["cables"].as_array().unwrap();
+    let lost: Vec<_> = cables.iter().filter(|one| one["may_break"] == false).collect();
+    assert_eq!(lost, [&json!({ "may_break": false, "lost": [6] })]);
+    assert!(run.stderr.contains("Step 2 of 4: plug a cable"), "{}", run.all());
+    let run = linesman(["ring", &on, "--end", "3.B", "--json"]);
+    let report = run.json();
+    assert_valid(&report, "ring");
+    assert_eq!((run.status, &report["expected_end"]), (1, &json!("3.B")), "{}", run.all());
+    let reason = report["wrong"]["reason"].as_str().unwrap();
+    assert!(reason.contains("closes at port C of SubDevice 4"), "{reason}");
     let run = linesman(["ring", &on, "--end", "9.Q"]);
     assert_eq!(run.status, 2, "{}", run.all());
     assert!(
@@ -187,6 +201,16 @@ fn numbers_are_read_in_three_ways_proposed_compared_and_set() {
     ] {
         assert!(run.stdout.contains(said), "{said}: {}", run.all());
     }
+    let report = linesman(["id", &place, "--json"]).json();
+    assert_valid(&report, "numbers");
+    let number = |no: usize, key: &str| report["devices"][no - 1][key].clone();
+    assert_eq!(number(5, "selector"), 5);
+    assert_eq!(
+        (number(5, "read"), number(2, "read")),
+        (json!("at 0x1000"), json!("by AL control"))
+    );
+    assert_eq!((number(3, "alias"), number(4, "alias")), (json!(30), json!(null)));
+    assert_eq!(report["differences"], json!(null));
     // As proposed, in a project.
     let saved = folder.path().join("saved.toml");
     let scan = linesman(["scan", &place, "--save", saved.to_str().unwrap()]);
@@ -226,6 +250,12 @@ fn numbers_are_read_in_three_ways_proposed_compared_and_set() {
         assert_eq!(run.status, 1, "{}", run.all());
         assert!(run.stderr.contains(expected), "{expected}: {}", run.all());
     }
+    let path = project.to_str().unwrap();
+    let run = linesman(["id", &on(&numbered(5, 7)), "--against", path, "--json"]);
+    let report = run.json();
+    assert_valid(&report, "numbers");
+    let differences = report["differences"].as_array().unwrap();
+    assert_eq!((run.status, differences.len()), (1, 1), "{}", run.all());
     let backup = folder.path().join("backup.bin");
     let words = ["id", &place, "T4", "--set", "31", "--backup", backup.to_str().unwrap()];
     let run = linesman(words);

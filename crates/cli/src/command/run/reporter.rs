@@ -365,6 +365,9 @@ pub(super) fn summary(report: &RunReport, paint: Paint) -> String {
             at(lateness.max_ns)
         ));
     }
+    for not_taken in &report.not_taken {
+        text.push_str(&format!("Not taken: {not_taken}\n"));
+    }
     for refused in &host.refused {
         text.push_str(&format!("Not granted: {refused}\n"));
     }
