@@ -83,7 +83,12 @@ fn restarted_with_group(model: &NetworkModel, id: DeviceId) -> bool {
         return true;
     }
     let fell = model.device(id).and_then(|one| {
-        one.al.changes.iter().filter(|change| change.is_own_fall()).map(|change| change.at).last()
+        one.al
+            .changes
+            .iter()
+            .filter(|change| change.is_own_fall())
+            .map(|change| change.at)
+            .next_back()
     });
     let (Some(fell), Some(first)) = (fell, model.device(*first)) else {
         return goes_with_group(model, id);

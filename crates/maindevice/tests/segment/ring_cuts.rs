@@ -135,8 +135,7 @@ impl RingOfBoxes {
         let (mut bench, _) = self.running(None);
         let mut stale = 0;
         for (number, device) in self.plan.devices.iter().enumerate() {
-            let entry =
-                FaultEntry::new("device-off".parse().unwrap()).device(&format!("B{number}"));
+            let entry = FaultEntry::new("device-off".parse().unwrap()).device(format!("B{number}"));
             let fault = bench.segment.inject(bench.now, &entry).unwrap();
             stale += self.until_all_but(&mut bench, &[device.id]);
             stale += self.stale(&mut bench, Span::ms(20), &[device.id]);
