@@ -32,7 +32,7 @@ pub struct SegmentEthernet {
     pub hosts: Vec<SegmentHost>,
 }
 
-/// UdpDatagrams that a device sends to all in its subnet (UDP port 9, discard), as drives send recorded values.
+/// Datagrams that a device sends to all in its subnet (UDP port 9, discard), as drives send recorded values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]

@@ -1,4 +1,4 @@
-//! UdpDatagrams that a device sends to all in its subnet, of its own accord.
+//! Datagrams that a device sends to all in its subnet, of its own accord.
 //!
 //! UDP over IPv4, without a checksum of UDP, to port 9 (discard), where nobody answers.
 
@@ -24,7 +24,7 @@ pub struct UdpDatagrams {
     pub every: Span,
 }
 
-/// UdpDatagrams over time.
+/// Datagrams over time.
 #[derive(Clone, Debug)]
 pub(super) struct DatagramSource {
     what: UdpDatagrams,
