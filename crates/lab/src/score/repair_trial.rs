@@ -24,7 +24,7 @@ pub struct RepairTrial {
 
 /// Tries the parts in the order in which one diagnosis after the other blames them.
 ///
-/// A fault is gone when its carrier was exchanged ([`linesman_sim::fault::Carrier`]). A cable, a SubDevice or the card
+/// A fault is gone when its carrier was exchanged ([`linesman_sim::fault::FaultCarrier`]). A cable, a SubDevice or the card
 /// that was exchanged in vain is told to the next look, as by `diagnose --after`; whoever has seen to anything else in
 /// vain goes on with the next cause that was named.
 pub(super) fn try_repairs(

@@ -7,7 +7,7 @@
 use linesman_config::fault::FaultName::{self, *};
 use linesman_proto::address::DeviceId;
 use linesman_proto::topology::{End, Tree};
-use linesman_sim::fault::Carrier;
+use linesman_sim::fault::FaultCarrier;
 
 use super::claim::Claim;
 use super::site::{Site, Way};
@@ -73,10 +73,10 @@ fn part(cause: FaultName, site: Site) -> Option<RepairedPart> {
         Site::Host => Some(End::MainDevice(linesman_proto::address::Path::A)),
         Site::Device(_) | Site::Network => None,
     };
-    match Carrier::of(cause) {
-        Carrier::Cable => near.map(RepairedPart::Cable),
-        Carrier::NoiseSource => near.map(RepairedPart::NoiseSource),
-        Carrier::Sender | Carrier::Receiver => {
+    match FaultCarrier::of(cause) {
+        FaultCarrier::Cable => near.map(RepairedPart::Cable),
+        FaultCarrier::NoiseSource => near.map(RepairedPart::NoiseSource),
+        FaultCarrier::Sender | FaultCarrier::Receiver => {
             let Some(end) = sending_or_receiving(cause, site) else {
                 return device.map(RepairedPart::Device);
             };
@@ -85,16 +85,18 @@ fn part(cause: FaultName, site: Site) -> Option<RepairedPart> {
                 End::Controller(id, _) => RepairedPart::Device(id),
             })
         }
-        Carrier::Device => device.map(RepairedPart::Device),
-        Carrier::Supply => device.map(RepairedPart::Supply),
-        Carrier::Settings => {
+        FaultCarrier::Device => device.map(RepairedPart::Device),
+        FaultCarrier::Supply => device.map(RepairedPart::Supply),
+        FaultCarrier::Settings => {
             device.map_or(Some(RepairedPart::Computer), |id| Some(RepairedPart::Settings(id)))
         }
-        Carrier::Wiring if cause == MainDeviceWrongPort => Some(RepairedPart::Wiring(DeviceId(0))),
-        Carrier::Wiring => device.map(RepairedPart::Wiring),
-        Carrier::Card => Some(RepairedPart::Card),
-        Carrier::Computer => Some(RepairedPart::Computer),
-        Carrier::OtherSender => Some(RepairedPart::OtherSender),
+        FaultCarrier::Wiring if cause == MainDeviceWrongPort => {
+            Some(RepairedPart::Wiring(DeviceId(0)))
+        }
+        FaultCarrier::Wiring => device.map(RepairedPart::Wiring),
+        FaultCarrier::Card => Some(RepairedPart::Card),
+        FaultCarrier::Computer => Some(RepairedPart::Computer),
+        FaultCarrier::OtherSender => Some(RepairedPart::OtherSender),
     }
 }
 

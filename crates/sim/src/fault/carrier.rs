@@ -7,7 +7,7 @@ use linesman_config::fault::FaultName::{self, *};
 /// It follows from what the kind does to the segment, and is used to try repairs: a fault is gone when its carrier was
 /// exchanged, and acts on when anything else was.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub enum Carrier {
+pub enum FaultCarrier {
     /// The cable or contact of its link, with its plugs and all that is looped into it.
     Cable,
     /// Something outside that disturbs its link.
@@ -32,7 +32,7 @@ pub enum Carrier {
     OtherSender,
 }
 
-impl Carrier {
+impl FaultCarrier {
     /// Of a fault of the catalogue.
     #[must_use]
     pub const fn of(fault: FaultName) -> Self {

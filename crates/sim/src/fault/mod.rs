@@ -59,7 +59,7 @@ mod watchdog_starved;
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
-pub use carrier::Carrier;
+pub use carrier::FaultCarrier;
 pub use error::FaultError;
 pub use manual::manual;
 pub use parameter::{Parameter, Shape};
