@@ -86,8 +86,8 @@ fn written(direction: FrameDirection) -> Vec<u8> {
 
 #[test]
 fn reading_and_writing_frames_allocate_nothing() {
-    // A frame with a direction has an option, for which pcap-parser makes a list.
-    for (direction, each) in [(FrameDirection::Unknown, 0), (FrameDirection::Incoming, 1)] {
+    // A frame with a direction has an option.
+    for direction in [FrameDirection::Unknown, FrameDirection::Incoming] {
         let file = std::io::Cursor::new(written(direction));
         let mut reader = CaptureReader::from_source("memory", file).unwrap();
         assert_eq!(reader.next_frame().unwrap().interface, CaptureInterfaceId(0));
@@ -96,7 +96,7 @@ fn reading_and_writing_frames_allocate_nothing() {
         while reader.next_frame().is_some() {
             frames += 1;
         }
-        assert_eq!((frames, allocations() - before), (10_000, each * 9_999), "{direction:?}");
+        assert_eq!((frames, allocations() - before), (10_000, 0), "{direction:?}");
     }
 }
 
