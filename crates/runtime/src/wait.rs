@@ -3,7 +3,7 @@
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// How often it is looked.
+/// Time from one look to the next.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// Looks every 200 ms, at least once, until there is something or the patience is at its end; `None` then.

@@ -13,7 +13,7 @@ use crate::access::{DatagramAccess, DatagramTarget};
 const AL_CONTROL: u16 = 0x0120;
 const AL_STATUS: u16 = 0x0130;
 const AL_STATUS_CODE: u16 = 0x0134;
-/// So many entries back the other copy of a request is looked for.
+/// Number of entries back to which the other copy of a request is looked for.
 const COPIES_APART: usize = 64;
 /// Most entries that are kept.
 const MOST: usize = 20_000;

@@ -1,4 +1,4 @@
-//! What came of one case, and of each of its faults.
+//! Outcome of one case, and of each of its faults.
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::report::Diagnosis;
@@ -13,7 +13,7 @@ use super::parts::span_ns;
 use super::repair_trial::RepairTrial;
 use super::unplayable::Unplayable;
 
-/// What came of one seed.
+/// Outcome of one seed.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CaseReport {
     /// The seed.
@@ -22,11 +22,11 @@ pub struct CaseReport {
     pub kind: CaseKind,
     /// SubDevices.
     pub devices: usize,
-    /// Whether it is a ring.
+    /// True if it is a ring.
     pub is_ring: bool,
-    /// Whether forwarded errors are counted, as far as types do.
+    /// True if forwarded errors are counted, as far as types do.
     pub forwarded: bool,
-    /// Whether the card's counters were known.
+    /// True if the card's counters were known.
     pub host_counters: bool,
     /// Findings while nothing was wrong, live and in the recording; `None` where the line never was healthy.
     pub healthy: Option<[Accusations; 2]>,
@@ -63,14 +63,14 @@ pub struct CaseReport {
     pub unplayable: Option<Unplayable>,
 }
 
-/// What came of one fault.
+/// Outcome of one fault.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FaultOutcome {
-    /// What it was.
+    /// Its name.
     pub name: FaultName,
     /// With place and parameters.
     pub entry: String,
-    /// How many effects the truth log has; without any the case does not count.
+    /// Number of effects in the truth log; without any the case does not count.
     pub effects: u64,
     /// The live diagnosis; `None` when only the recording is judged.
     pub live: Option<Judged>,
@@ -82,11 +82,11 @@ pub struct FaultOutcome {
     pub is_bearable: bool,
     /// True if nothing that anybody could see tells it from a line as planned.
     pub is_unseen: bool,
-    /// Whether it is the MainDevice that stops.
+    /// True if it is the MainDevice that stops.
     pub is_pause: bool,
     /// What listeners said of it, beside a MainDevice with the habits of others.
     pub listened: Option<Listeners>,
-    /// What exchanges did to it; of single faults for which the live diagnosis had an answer.
+    /// Outcome of the exchanges that were tried; of single faults for which the live diagnosis had an answer.
     pub repair: Option<RepairTrial>,
 }
 

@@ -1,4 +1,4 @@
-//! What machines have beside their devices and cables: supplies that several stations share, and stations that are
+//! Equipment beside devices and cables: supplies that several stations share, and stations that are
 //! plugged in and out together.
 
 use linesman_config::project::{IdentificationChoice, IdentificationWay, Project, ProjectGroup};

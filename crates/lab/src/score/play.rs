@@ -298,7 +298,7 @@ impl<'a> Play<'a> {
         Ok(report)
     }
 
-    /// What exchanges do to a fault that had an effect, and of which more than nothing was said.
+    /// Tries repairs of a fault that had an effect and that can be seen.
     fn trial(
         &self,
         active: &Active,

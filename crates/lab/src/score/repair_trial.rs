@@ -15,7 +15,7 @@ use crate::verdict::{Claim, Truth};
 /// Exchanges that are tried before somebody else is called.
 pub const MOST_EXCHANGES: u8 = 3;
 
-/// What exchanges did to a fault.
+/// Outcome of the exchanges that were tried for a fault.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct RepairTrial {
     /// Number of the exchange that mended it, from 1; `None` where none did of [`MOST_EXCHANGES`].

@@ -108,7 +108,7 @@ impl MergedCaptures {
         Some(shares.sum::<Option<f64>>()? / self.sources.len() as f64)
     }
 
-    /// How they ended: the first that could not be read to its end counts; `None` before all have ended.
+    /// Their end: that of the first that could not be read whole, if any; `None` before all have ended.
     #[must_use]
     pub const fn end(&self) -> Option<&CaptureEnd> {
         self.end.as_ref()

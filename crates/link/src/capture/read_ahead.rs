@@ -44,7 +44,7 @@ struct ReadFrame {
     frame: CapturedFrame<'static>,
     at: usize,
     stored_len: usize,
-    /// Where the Ethernet frame begins within what was stored.
+    /// Offset of the Ethernet frame within what was stored.
     start: usize,
     len: usize,
 }
@@ -147,7 +147,7 @@ impl ReadAhead {
         self.progress.share()
     }
 
-    /// How the capture ended; `None` before [`advance`](Self::advance) was `false`.
+    /// The end of the capture; `None` before [`advance`](Self::advance) was `false`.
     #[must_use]
     pub fn end(&self) -> Option<&CaptureEnd> {
         self.batch.end.as_ref().filter(|_| self.taken >= self.batch.frames.len())

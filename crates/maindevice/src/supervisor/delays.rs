@@ -16,7 +16,7 @@ use crate::exchange::Target;
 use crate::executor::lock;
 use crate::procedure::clock::{self, ClockError};
 
-/// How often it is looked whether the line still changes.
+/// Time from one look to the next whether the line still changes.
 const LOOK: Span = Span::ms(2);
 /// It is measured when nothing has changed for so long.
 const SETTLED: Span = Span::ms(10);
@@ -25,12 +25,12 @@ const UNSETTLED: Span = Span::ms(200);
 /// When it is measured again what could not be measured, and how often it is tried.
 const AGAIN: Span = Span::ms(50);
 const ATTEMPTS: u32 = 5;
-/// So often it is measured: clocks are read in steps of 10 ns, and each hop is off by a few of them.
+/// Number of measurements that are averaged: clocks are read in steps of 10 ns, and each hop is off by a few of them.
 const MEASUREMENTS: u32 = 4;
 /// A smaller difference is noise of the measurement.
 const NOISE: Span = Span::ns(30);
 
-/// What tells that frames may travel otherwise: how many answer, and how often groups have left.
+/// Signs that frames may travel otherwise: how many answer, and how often groups have left.
 type Answering = (Option<WorkingCounter>, u32);
 
 /// Measures the delays again after each change, for as long as the network runs.

@@ -36,7 +36,7 @@ pub enum SoftwareFault {
     EoeBufferFull,
 }
 
-/// What becomes of a fragment.
+/// Fate of a fragment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FragmentTrouble {
     /// It is left out.
@@ -50,11 +50,11 @@ pub enum FragmentTrouble {
 /// Which fragments do not leave as they should.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SpoiledFragments {
-    /// What becomes of them.
+    /// Fate of those that are hit.
     pub trouble: FragmentTrouble,
-    /// How many of 1,000,000 fragments.
+    /// Number of fragments that are hit, of 1,000,000.
     pub share_ppm: u32,
-    /// What decides which ones.
+    /// Seed of the chance that chooses them.
     pub seed: Seed,
 }
 

@@ -2,7 +2,7 @@
 
 use linesman_config::fault::FaultName::{self, *};
 
-/// What a fault sits in.
+/// Part of a plant that a fault sits in.
 ///
 /// It follows from what the kind does to the segment, and is used to try repairs: a fault is gone when its carrier was
 /// exchanged, and acts on when anything else was.
@@ -18,7 +18,7 @@ pub enum FaultCarrier {
     Receiver,
     /// Its device: hardware, firmware, quartz.
     Device,
-    /// What feeds its devices, with its wiring and its fuse.
+    /// Supply of its devices, with its wiring and its fuse.
     Supply,
     /// Settings of its device, in the project or in itself.
     Settings,

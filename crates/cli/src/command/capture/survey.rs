@@ -85,7 +85,7 @@ pub(super) fn survey(
     Ok(Surveyed { report, engine, names })
 }
 
-/// What a recording without a note of its end leaves open.
+/// Question that a recording without a note of its end leaves open.
 fn no_end_mark() -> UnknownReport {
     UnknownReport {
         what: "whether anything came after the last frame".to_owned(),

@@ -36,7 +36,7 @@ fn address(text: &str) -> Result<SocketAddr, String> {
 }
 
 impl GatewayArguments {
-    /// How the gateway is to be opened, if one is wanted: as these options say, or else as the project does.
+    /// The gateway that is wanted, if one is: as these options say, or else as the project does.
     pub(super) fn wanted(&self, source: &Source) -> Result<Option<GatewayOptions>, Failure> {
         if let Some(listen) = self.gateway {
             let allowed = self.gateway_allow.clone();

@@ -24,7 +24,7 @@ pub(super) struct RecordConditions {
     before: Option<Instant>,
 }
 
-/// What becomes of a frame.
+/// Fate of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct FrameDecision {
     /// It is written.
