@@ -44,7 +44,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
     }
     let [passed, failed, skipped] = counts;
     if !ran.success() || failed > 0 || passed == 0 {
-        let why = format!("{failed} failed; {}", ran.explain());
+        let why = format!("{failed} failed{}; {}", failures(&ran.output), ran.explain());
         return Ok(Outcome::Failed { count: passed, why });
     }
     if wanted.is_empty() {
@@ -55,6 +55,26 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
         note += &format!(", {skipped} skipped");
     }
     Ok(Outcome::Passed { count: passed, note })
+}
+
+/// What failed, with the last line of its reason, which is the error of a program that a check ran.
+fn failures(output: &str) -> String {
+    let mut told = String::new();
+    let mut last: Option<&str> = None;
+    for line in output.lines() {
+        if let Some(check) = line.strip_prefix("FAIL ") {
+            told.extend(last.take().into_iter().map(|line| format!(" … {line}")));
+            told += if told.is_empty() { ": " } else { "; " };
+            told += check;
+        } else if ["ok ", "skip "].iter().any(|word| line.starts_with(word))
+            || line.contains(" checks passed, ")
+        {
+            told.extend(last.take().into_iter().map(|line| format!(" … {line}")));
+        } else if !told.is_empty() {
+            last = Some(line.trim()).filter(|line| !line.is_empty()).or(last);
+        }
+    }
+    told
 }
 
 /// Builds the peer made with ethercrab; where it is, if it could be built.
@@ -88,4 +108,21 @@ fn latency(context: &Context<'_>) -> Result<()> {
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn failed_check_is_told_with_the_last_line_of_its_reason() {
+        let output = "\
+            ok one: 12 packets, 1.0 s\n\
+            FAIL two: AssertionError: Traceback (most recent call last):\n  File \"two.py\"\nWkcError: 0\n\
+            ok three: 3 packets, 1.0 s\n\
+            FAIL four: RuntimeError: no line\n\
+            2 checks passed, 2 failed, 0 were left out\n";
+        assert_eq!(
+            super::failures(output),
+            ": two: AssertionError: Traceback (most recent call last): … WkcError: 0; four: RuntimeError: no line"
+        );
+    }
 }
