@@ -68,7 +68,7 @@ pub enum LastHop {
         card: Path,
         /// How many frames were lost.
         lost: u64,
-        /// True if frames were damaged elsewhere, too, at other times.
+        /// True if frames were damaged elsewhere, or links changed, at other times.
         is_beside: bool,
         /// When the first was missed.
         first: Instant,
@@ -108,7 +108,8 @@ impl Located {
             }
             beside.extend(walk.unknown_beside(route));
         }
-        if !nothing_counted {
+        // Where nothing was counted and no link changed, all frames that were lost are of one kind.
+        if !nothing_counted || located.last_hops.is_empty() {
             located.last_hops = beside;
         }
         located.last_hops.extend(ends.into_iter().flatten());

@@ -36,7 +36,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::state::status_code::Class as CodeClass;
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 use linesman_proto::topology::route::Direction;
 
@@ -75,6 +75,9 @@ pub const LAST_HOP: RulePage = RulePage {
 
 /// Errors that did not come again for this long are over.
 const QUIET: Span = Span::s(2);
+
+/// So many damaged frames at the card may be what a link cut off when it opened and when it was back.
+const CUT_OFF: u64 = 4;
 
 /// The rule.
 pub const RULE: Rule = Rule { pages: &[ON_LINK, INSIDE, LAST_HOP], judge };
@@ -211,6 +214,14 @@ fn symptoms(input: &LocateInput<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
         End::MainDevice(_) => None,
     });
     let card = suspicion.last_hop.as_ref().and_then(|hop| match hop {
+        // A link that opens cuts off a frame or two; those that were damaged long after it are no work of its.
+        LastHop::Damaged { frames, last, .. }
+            if *frames > CUT_OFF
+                && input.any_link_changed(Instant::ZERO, *last)
+                && !input.any_link_changed(*last, *last) =>
+        {
+            None
+        }
         LastHop::Damaged { .. } => Some(Symptom::CardErrors),
         LastHop::Unknown { is_beside: false, .. } => Some(Symptom::FramesLost),
         // The other damage, which explains lost frames, does not explain these.

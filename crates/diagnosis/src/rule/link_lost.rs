@@ -44,7 +44,7 @@ use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Sev
 use crate::locate::{LinkLoss, LinkLosses};
 use crate::model::{NetworkModel, Seen, is_on_terminal_bus, search};
 
-pub(super) use follows::follows;
+pub(super) use follows::{SLOWEST_LINK_UP, follows};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {

@@ -19,6 +19,7 @@
 //! **What to do.** Measure the supply of the SubDevice under load, at the device; look what is switched
 //! at these moments.
 
+mod card;
 mod supply;
 mod terminal_bus;
 mod unseen;
@@ -82,11 +83,14 @@ struct Fall<'a> {
     change: &'a AlChange,
     is_restart: bool,
     gone: Option<(Instant, Instant)>,
+    /// When the card that is plugged to it lost its link, if that was then.
+    card_lost: Option<Instant>,
 }
 
 impl Fall<'_> {
     fn began(&self) -> Instant {
-        self.gone.map_or(self.change.at, |(since, _)| since)
+        let noticed = self.gone.map_or(self.change.at, |(since, _)| since);
+        self.card_lost.map_or(noticed, |lost| lost.min(noticed))
     }
 
     /// Whether both were on their way down and up at the same time: a device without supply of its own
@@ -98,6 +102,10 @@ impl Fall<'_> {
     /// True if the supply was away for longer than a dip, as far as the outage and the time that a link needs tell.
     fn was_long(&self, model: &NetworkModel, together: &[Self]) -> bool {
         let Some((since, until)) = self.gone else { return false };
+        // No card waits so long for its link alone.
+        if until.since(self.began()) >= link_lost::SLOWEST_LINK_UP {
+            return true;
+        }
         let node = self.device.id.index();
         let above = model.tree.as_ref().filter(|tree| node < tree.len());
         let above = above.and_then(|tree| tree.upstream(node)?.node());
@@ -130,7 +138,8 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
                 continue;
             }
             let is_restart = change.to.state().state() == Some(AlState::Init) || gone.is_some();
-            falls.push(Fall { device, change, is_restart, gone });
+            let card_lost = card::lost(model, device, change);
+            falls.push(Fall { device, change, is_restart, gone, card_lost });
         }
     }
     conditions.extend(unseen::restarted(model));
@@ -289,15 +298,16 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     if is_first {
         let mut follows = BTreeSet::new();
         for other in together {
-            follows.extend(consequences(model, other));
+            follows.extend(consequences(model, other, together));
             if other.device.id != device.id {
                 follows.insert(Symptom::StateLost(other.device.id));
             }
         }
         condition = condition.explaining(follows);
     } else {
-        condition =
-            condition.about([Symptom::StateLost(device.id)]).explaining(consequences(model, fall));
+        condition = condition
+            .about([Symptom::StateLost(device.id)])
+            .explaining(consequences(model, fall, together));
     }
     if is_back(fall)
         && let Some(status) = device.al.status
@@ -326,9 +336,9 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
 }
 
 /// All that a device without power brings about.
-fn consequences(model: &NetworkModel, fall: &Fall<'_>) -> Vec<Symptom> {
+fn consequences(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Vec<Symptom> {
     let id = fall.device.id;
-    let mut follows = links_lost_with(model, fall);
+    let mut follows = links_lost_with(model, fall, together);
     let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)];
     follows.extend(own);
     follows.extend(out_of_step(model, fall.device));
@@ -379,15 +389,18 @@ fn out_of_step(model: &NetworkModel, device: &Device) -> Vec<Symptom> {
 
 /// What follows from a restart at the links of the device: without supply it has no link, so its
 /// neighbours lose theirs. Not so where a link was lost more often than the device restarted, at
-/// another time, or is down though the device is back.
-fn links_lost_with(model: &NetworkModel, fall: &Fall<'_>) -> Vec<Symptom> {
+/// another time, or is down though the device has been back for long.
+fn links_lost_with(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Vec<Symptom> {
     let Some(tree) = &model.tree else { return Vec::new() };
     let device = fall.device;
     let falls: Vec<_> = device.al.changes.iter().filter(|change| change.is_own_fall()).collect();
     let earliest = match falls.as_slice() {
         [first, _, ..] => first.at.before(BEFORE),
-        [] | [_] => fall.began(),
+        // Those whose supply went together lost their links together, whenever each was missed.
+        [] | [_] => together.iter().map(Fall::began).fold(fall.began(), Instant::min),
     };
+    // Of a device that has just come back some links are up, and others on their way.
+    let is_coming_up = model.now < fall.change.at + link_lost::SLOWEST_LINK_UP;
     let mut follows = Vec::new();
     for drops in LinkLosses::all(model) {
         let link = tree.links()[drops.link];
@@ -397,7 +410,7 @@ fn links_lost_with(model: &NetworkModel, fall: &Fall<'_>) -> Vec<Symptom> {
         let was_never_up = falls.first().is_some_and(|first| stays_down(device, first, drops.last));
         let is_then = drops.first + TOGETHER >= earliest
             && (drops.last <= fall.change.at + LINKS_COUNTED || was_never_up)
-            && !drops.is_down;
+            && (!drops.is_down || (is_coming_up && drops.first <= earliest + TOGETHER));
         let is_as_often = drops.count <= falls.len() as u64
             || was_never_up
             || was_away_at_each(device, &drops, falls.len());

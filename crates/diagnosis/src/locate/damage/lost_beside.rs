@@ -1,4 +1,5 @@
-//! Frames that were lost beside other damage: at moments at which no controller counted anything.
+//! Frames that were lost beside other damage, or beside links that changed: at moments at which no controller counted
+//! anything and no link changed.
 
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
@@ -12,15 +13,22 @@ use crate::model::counters::RISES_KEPT;
 /// A frame that is lost was damaged so long after it was sent at most.
 const IN_FLIGHT: Span = Span::ms(10);
 
+/// Beside links that changed, and nothing else, so many are too many for chance: a change that is noticed late costs a frame
+/// or two.
+const BESIDE_CHANGES: usize = 4;
+
+/// So many frames that are lost in a row were not hit one by one.
+const IN_A_ROW: u64 = 8;
+
 impl ErrorWalk<'_, '_> {
-    /// Frames that were lost beside other damage: at a time at which no controller counted anything, as readings
-    /// before and after it show.
+    /// Frames that were lost beside other damage or links that changed: at a time at which no controller counted anything, as
+    /// readings before and after it show, and no link changed.
     pub(super) fn unknown_beside(&self, route: &Route) -> Option<LastHop> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let model = self.input.model();
         let is_watched = model.host.is_watched || model.traffic.recording.cut() > 0;
-        if self.carried.frames == 0 || !self.is_read || is_watched || model.hole.is_some() {
+        if !self.is_read || is_watched || model.hole.is_some() {
             return None;
         }
         let counted = self.counting_times(route)?;
@@ -34,7 +42,16 @@ impl ErrorWalk<'_, '_> {
             .filter(|at| !self.input.any_link_changed(*at, *at))
             .filter(|at| !model.traffic.recording.was_bad(*at, *at))
             .collect();
+        if self.carried.frames == 0 {
+            // What nobody answers for a while has a cause of its own.
+            let silences =
+                || model.traffic.losses.silences().iter().filter(|one| one.frames >= IN_A_ROW);
+            lost.retain(|at| !silences().any(|one| one.since.at <= *at && *at <= one.last.at));
+        }
         lost.sort_unstable();
+        if self.carried.frames == 0 && lost.len() < BESIDE_CHANGES {
+            return None;
+        }
         let (first, last) = (*lost.first()?, *lost.last()?);
         let is_beside = true;
         Some(LastHop::Unknown { hop, card, lost: lost.len() as u64, is_beside, first, last })

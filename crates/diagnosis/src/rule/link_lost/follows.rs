@@ -14,7 +14,7 @@ use crate::locate::LinkLosses;
 use crate::model::{NetworkModel, Rise};
 
 /// No link of a device that starts anew comes up so much later than the others.
-const SLOWEST_LINK_UP: Span = Span::s(5);
+pub(in crate::rule) const SLOWEST_LINK_UP: Span = Span::s(5);
 
 /// What can follow from the loss.
 pub(in crate::rule) fn follows(model: &NetworkModel, tree: &Tree, link: usize) -> Vec<Symptom> {

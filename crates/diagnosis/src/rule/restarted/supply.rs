@@ -15,14 +15,14 @@ const NOTICED_LATE: Span = Span::ms(500);
 
 /// How long it was away; `None` where the clock does not tell.
 pub(super) fn away(fall: &Fall<'_>) -> Option<Span> {
-    let (since, until) = fall.gone?;
+    let (since, until) = (fall.began(), fall.gone?.1);
     let began = fall.device.up_time?.began_within(since.before(NOTICED_LATE), until)?;
     Some(began.since(since))
 }
 
 /// What shows that.
 pub(super) fn evidence(model: &NetworkModel, fall: &Fall<'_>) -> Option<Evidence> {
-    let ((since, until), away) = (fall.gone?, away(fall)?);
+    let (since, until, away) = (fall.began(), fall.gone?.1, away(fall)?);
     let text = format!(
         "the clock of {} began {:.0} ms after it was gone: its supply was back by then, and the rest of {:.0} ms its links \
          took to come up",
