@@ -25,8 +25,8 @@ use super::{Rule, RulePage, View, frame_errors};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::locate::cause::CausePlace;
 use crate::locate::probe_places::{ProbeSign, places};
-use crate::model::NetworkModel;
 use crate::model::probe_record::{ProbeSection, ProbeTally};
+use crate::model::{NetworkModel, Pause};
 
 /// The page.
 pub const PAGE: RulePage = RulePage {
@@ -69,7 +69,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         }
         show_turn(view, section, conditions);
     }
-    conditions.extend(nothing_came(view));
+    let pause = nothing_came(view, conditions);
+    conditions.extend(pause);
+    add_link_before_probe(view, conditions);
 }
 
 fn add(
@@ -128,12 +130,26 @@ fn add(
     conditions.push(advise(condition, model, section, found.len()));
 }
 
-/// Nothing came to the first port of a probe inside the line for a while.
-fn nothing_came(view: &View<'_>) -> Option<Condition> {
+/// Nothing came to the first port of a probe inside the line for a while. A MainDevice that had lost frames before sends
+/// nothing meanwhile: then that is evidence of what has damaged them.
+fn nothing_came(view: &View<'_>, conditions: &mut [Condition]) -> Option<Condition> {
     let model = view.model;
     let first = model.capture_probe.inside()?;
     let pauses = model.cyclic.iter().flat_map(|cyclic| &cyclic.sent.pauses);
-    let longest = pauses.filter(|pause| pause.span() >= LONG).max_by_key(|pause| pause.span())?;
+    let is_long = |pause: &&Pause| pause.span() >= LONG && is_quiet(model, pause);
+    let longest = pauses.filter(is_long).max_by_key(|pause| pause.span())?;
+    let mut damage = model.capture_probe.sections().iter().filter(|one| has_begun(one, longest));
+    if damage.next().is_some() {
+        let text =
+            format!("then nothing came to {} for {}", port_text(model, first), longest.span());
+        let is_damage = |one: &&mut Condition| {
+            matches!(one.page.code, "H110" | "H111" | "H116") && one.since <= longest.from
+        };
+        for one in conditions.iter_mut().filter(is_damage) {
+            one.evidence.push(Evidence::frame(longest.from, 0, text.clone()));
+        }
+        return None;
+    }
     let tree = model.tree.as_ref();
     let found =
         tree.and_then(|tree| places(&model.capture_probe, tree, None, first, ProbeSign::Lost));
@@ -161,6 +177,48 @@ fn nothing_came(view: &View<'_>) -> Option<Condition> {
     Some(condition.advise(
         "Put a channel of the probe into the link of the MainDevice: it tells what was sent.",
     ))
+}
+
+/// True if no frame at all came for most of a pause of the process data: those of a new start-up may come meanwhile.
+fn is_quiet(model: &NetworkModel, pause: &Pause) -> bool {
+    let quiet = |one: Pause| {
+        let (from, to) = (one.from.max(pause.from), one.to.min(pause.to));
+        to > from && to.since(from) * 2 >= pause.span()
+    };
+    model.quiet().any(quiet)
+}
+
+/// True if more frames than a change of a link costs were damaged or lost in a section when a pause began.
+fn has_begun(section: &ProbeSection, pause: &Pause) -> bool {
+    let then = |tally: ProbeTally| {
+        let (Some(first), Some(last)) = (tally.frames.first, tally.frames.last) else {
+            return false;
+        };
+        tally.frames.sum > CUT_BY_CHANGE && first <= pause.from && pause.from <= last + AROUND
+    };
+    [section.fresh, section.marked, section.lost].into_iter().any(then)
+}
+
+/// The probe may sit at either end of the link of the MainDevice: what was not sent, and what was lost on that link before
+/// the probe, look alike.
+fn add_link_before_probe(view: &View<'_>, conditions: &mut [Condition]) {
+    let model = view.model;
+    let record = &model.capture_probe;
+    let Some(first) = record.order.ports().first().filter(|_| record.order.len() > 1) else {
+        return;
+    };
+    if first.before() != Some(0) {
+        return;
+    }
+    let tree = model.tree.as_ref();
+    let found = tree.and_then(|tree| places(record, tree, None, first.number, ProbeSign::Lost));
+    let link = found.into_iter().flatten().find(|at| matches!(at, CausePlace::Link(..)));
+    let Some(link) = link.map(|at| place(model, at)) else { return };
+    for paused in conditions.iter_mut().filter(|one| one.page.code == "X513") {
+        let cause = cause(&link, ProbeSign::Lost);
+        let confidence = paused.confidence / 2.0;
+        paused.alternatives.push(Alternative { cause, place: Some(link), confidence });
+    }
 }
 
 /// True if a condition explains a few frames that were lost or cut off then.
