@@ -153,7 +153,7 @@ impl ProbePlay<'_> {
         // The last frames come in.
         self.play.run(Span::ms(30))?;
         let diagnosis = self.judge(&mut report.copies);
-        let said = diagnosis.findings.iter().map(|one| self.told(one));
+        let said = with_consequences(&diagnosis.findings).map(|one| self.told(one));
         report.said = said.collect();
         let Some(active) = active.first() else {
             let is_alarm = |finding: &FindingReport| finding.severity != Severity::Info;
@@ -219,7 +219,10 @@ impl ProbePlay<'_> {
 
     fn told(&self, finding: &FindingReport) -> String {
         let evidence = finding.evidence.last().map_or("", |evidence| evidence.text.as_str());
-        format!("{} {:?} {:?}: {evidence}", finding.code, finding.cause, finding.place)
+        let others = finding.alternatives.len();
+        let others = if others == 0 { String::new() } else { format!(" or {others} others") };
+        let FindingReport { id, code, cause, place, .. } = finding;
+        format!("{code} {cause:?} {place:?}{others} ({id}): {evidence}")
     }
 
     fn outcome(&self, truth: &Truth, diagnosis: &Diagnosis, damaged: u64) -> ProbeOutcome {
