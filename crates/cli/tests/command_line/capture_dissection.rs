@@ -8,10 +8,11 @@ use std::process::Command as Program;
 
 use crate::capture_info::info;
 use crate::captures::captures;
+use crate::support::linesman;
 use serde_json::Value;
 
 /// Fields that tshark is asked for, one column each.
-const FIELDS: [&str; 25] = [
+const FIELDS: [&str; 27] = [
     "frame.number",
     "eth.src",
     "ecat.cmd",
@@ -37,6 +38,8 @@ const FIELDS: [&str; 25] = [
     "ecat_mailbox.coe.abortcode",
     "ecat_mailbox.coe.sdolength",
     "ecat_mailbox.coe.type",
+    "ecat.reg.physaddr",
+    "ecat.reg.dlstatus2",
 ];
 
 /// A frame as tshark shows it: the values of each field.
@@ -316,6 +319,70 @@ fn our_sii_words(info: &Value) -> Words {
     words
 }
 
+/// Links: number and port of the end nearer the MainDevice, number and port of the other one; 0 is the MainDevice.
+type Links = Vec<(u64, char, u64, char)>;
+
+/// The tree as the ports of DL status tell it, read by station address; `None` unless all that got a station address were
+/// read, and where they were read differently later.
+fn links(rows: &[Row]) -> Option<Links> {
+    let (mut stations, mut ports) = (BTreeMap::new(), BTreeMap::<u64, Vec<u64>>::new());
+    for row in rows {
+        let datagrams = row.datagrams();
+        let at = |ado: u64| datagrams.iter().filter(move |one| one.2 == ado);
+        let addresses = row.all("ecat.reg.physaddr");
+        // The frame on its way out alone holds the positions that were asked for.
+        if !row.is_return() && addresses.len() == at(0x0010).count() {
+            for ((command, adp, _, _), station) in at(0x0010).zip(&addresses) {
+                if *command == 2 {
+                    stations.insert(adp.wrapping_neg() & 0xFFFF, *station);
+                }
+            }
+        }
+        let statuses = row.all("ecat.reg.dlstatus2");
+        if row.is_return() && statuses.len() == at(0x0110).count() {
+            for ((command, station, _, wkc), status) in at(0x0110).zip(&statuses) {
+                if (*command, *wkc) == (4, 1) {
+                    push_changed(ports.entry(*station).or_default(), *status);
+                }
+            }
+        }
+    }
+    // Two bits for each port: 2 is an open port that communicates.
+    let is_active = |status: u64, port: u64| status >> (2 * port) & 3 == 2;
+    let mut links = Links::new();
+    // Ends that frames come to next, the nearest last: from A they go to D, B, C.
+    let mut ends = vec![(0, 'A')];
+    for (no, (position, station)) in (1..).zip(stations) {
+        let [status] = ports.get(&station)?[..] else { return None };
+        if position + 1 != no || !is_active(status, 0) {
+            return None;
+        }
+        let (upstream, port) = ends.pop()?;
+        links.push((upstream, port, no, 'A'));
+        let further = [(2, 'C'), (1, 'B'), (3, 'D')].into_iter();
+        ends.extend(
+            further.filter(|(port, _)| is_active(status, *port)).map(|(_, name)| (no, name)),
+        );
+    }
+    (!links.is_empty() && ends.is_empty()).then_some(links)
+}
+
+fn our_links(info: &Value) -> Links {
+    let end = |end: &Value| {
+        let port = end["port"].as_str().unwrap().chars().next().unwrap();
+        (end["no"].as_u64().unwrap(), port)
+    };
+    let links = info["links"].as_array().unwrap().iter();
+    let mut all: Links = links
+        .map(|link| {
+            let ((a, a_port), (b, b_port)) = (end(&link["a"]), end(&link["b"]));
+            (a, a_port, b, b_port)
+        })
+        .collect();
+    all.sort_unstable_by_key(|link| link.2);
+    all
+}
+
 pub(crate) fn files(directory: &Path) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> =
         fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -333,6 +400,7 @@ struct Compared {
     read: usize,
     sdos: usize,
     words: usize,
+    links: usize,
 }
 
 fn count(states: &States) -> usize {
@@ -356,6 +424,10 @@ fn dissection_of_tshark_agrees_on_states_sdos_sii_words_and_commands() {
         assert_eq!(our_sdos(&info), transfers, "{name}: SDO transfers");
         let words = sii_words(&rows);
         assert_eq!(our_sii_words(&info), words, "{name}: SII words");
+        if let Some(links) = links(&rows) {
+            assert_eq!(our_links(&info), links, "{name}: links");
+            compared.links += links.len();
+        }
         compared.captures += 1;
         compared.datagrams += theirs.values().sum::<u64>();
         compared.asked += count(&asked);
@@ -367,4 +439,54 @@ fn dissection_of_tshark_agrees_on_states_sdos_sii_words_and_commands() {
     assert!(compared.captures >= 17 && compared.datagrams > 30_000, "{compared:?}");
     assert!(compared.asked > 50 && compared.read > 50, "{compared:?}");
     assert!(compared.sdos > 40 && compared.words > 1_000, "{compared:?}");
+    assert!(compared.links >= 25, "{compared:?}");
+}
+
+/// A line that branches at the junctions of both kinds of ports.
+const BRANCHING: &str = r#"
+name = "branching"
+seed = 1
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "O1"
+type = "EL2008"
+on = "K1.B"
+[[device]]
+name = "J1"
+type = "EK1122"
+on = "O1.B"
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "J1.B"
+[[device]]
+name = "I2"
+type = "EL1008"
+on = "K2.B"
+[[device]]
+name = "K3"
+type = "EK1100"
+on = "J1.D"
+[[device]]
+name = "I1"
+type = "EL1008"
+on = "J1.C"
+"#;
+
+#[test]
+fn tree_of_a_branching_line_of_our_own_is_that_of_tshark() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plant, path) = (folder.path().join("plant.toml"), folder.path().join("own.pcapng"));
+    fs::write(&plant, BRANCHING).unwrap();
+    let place = format!("sim:{}", plant.display());
+    let run = linesman(["diagnose", &place, "--seconds", "2", "--record", path.to_str().unwrap()]);
+    assert!(run.status <= 1, "{}", run.all());
+    let Some(rows) = dissected(&path) else { return };
+    let info = info(&path);
+    let links = links(&rows).expect("all were read");
+    assert_eq!(links.len(), 7, "{links:?}");
+    assert_eq!(our_links(&info), links);
 }
