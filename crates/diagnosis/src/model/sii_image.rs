@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use linesman_proto::port::PortMap;
 use linesman_proto::sii::word;
-use linesman_proto::sii::{CategoryKind, General, PortKind, WordAddress};
+use linesman_proto::sii::{CategoryKind, General, Image, PortKind, WordAddress};
 
 /// Most words kept: categories with names lie near the front.
 const MOST_WORDS: usize = 2048;
@@ -139,19 +139,38 @@ impl SiiImage {
 
     /// Where the content of a category lies, in bytes, if the heads of those before it were read.
     fn find(&self, wanted: CategoryKind) -> Option<Range<usize>> {
+        self.categories().find_map(|(kind, content)| (kind == wanted).then_some(content))
+    }
+
+    /// Categories and where their contents lie, in bytes, up to the first one whose head was not read.
+    fn categories(&self) -> impl Iterator<Item = (CategoryKind, Range<usize>)> {
         let mut at = word::FIRST_CATEGORY.value();
-        while (at as usize) < MOST_WORDS {
+        std::iter::from_fn(move || {
+            if at as usize >= MOST_WORDS {
+                return None;
+            }
             let kind = CategoryKind::from_code(self.word(WordAddress(at))?);
-            let content = at + 2..at + 2 + u32::from(self.word(WordAddress(at + 1))?);
             if kind == CategoryKind::End {
                 return None;
             }
-            if kind == wanted {
-                return Some(2 * content.start as usize..2 * content.end as usize);
-            }
+            let content = at + 2..at + 2 + u32::from(self.word(WordAddress(at + 1))?);
             at = content.end;
+            Some((kind, 2 * content.start as usize..2 * content.end as usize))
+        })
+    }
+
+    /// The image as far as it was read: words that are not known read 0, and a category that was not read to its end is
+    /// not in it. `None` where nothing of it can be used.
+    #[must_use]
+    pub fn image(&self) -> Option<Image> {
+        let mut bytes = self.bytes.get(..2 * word::FIRST_CATEGORY.value() as usize)?.to_vec();
+        let read = |content: &Range<usize>| content.clone().all(|at| self.byte(at).is_some());
+        for (_, content) in self.categories().filter(|(_, content)| read(content)) {
+            let head = content.start - 4;
+            bytes.extend_from_slice(&self.bytes[head..content.end]);
         }
-        None
+        bytes.extend(CategoryKind::End.code().to_le_bytes());
+        Image::parse(&bytes).ok()
     }
 }
 
