@@ -4,9 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use linesman_config::attachment::Attachment;
 use linesman_config::esi::Esi;
 use linesman_config::esi::header::{EsiHeader, headers};
+use linesman_config::profile::MappedPdo;
 use linesman_config::project::{Described, ProjectDevice};
+use linesman_proto::address;
 
 use super::index::Index;
 
@@ -83,6 +86,25 @@ impl Library {
             headers.filter(|one| (one.vendor_id, one.product_code) == (vendor_id, product_code));
         let best = fitting.max_by_key(|one| (Some(one.revision) == revision, one.revision));
         best.map(|one| one.type_name.as_str())
+    }
+
+    /// The PDOs that a product assigns by default, by its description: of its revision, else of a near one.
+    ///
+    /// # Errors
+    /// Why the description cannot be used, in words; also where there is none.
+    pub fn pdos_of(
+        &mut self,
+        vendor_id: u32,
+        product_code: u32,
+        revision: Option<u32>,
+    ) -> Result<Vec<MappedPdo>, String> {
+        let wanted = ProjectDevice {
+            vendor_id: Some(vendor_id),
+            product_code: Some(product_code),
+            revision,
+            ..ProjectDevice::at("", Attachment::MainDevice(address::Path::A))
+        };
+        Ok(self.find(&wanted)?.map_or_else(Vec::new, |described| described.profile.pdos))
     }
 
     /// What is known of a device of a project; nothing when no description fits.
