@@ -4,7 +4,7 @@ use linesman_diagnosis::model::NetworkModel;
 use linesman_diagnosis::model::learn::{Answer, answers};
 use linesman_diagnosis::observe::{Exchange, FrameCopy};
 use linesman_proto::address::{
-    DeviceId, LogicalAddress, Position, RegisterAddress, StationAddress,
+    DeviceId, LogicalAddress, Path, Position, RegisterAddress, StationAddress,
 };
 use linesman_proto::command::{Addressing, Command, Effect};
 use linesman_proto::frame::FrameView;
@@ -56,6 +56,10 @@ pub struct DatagramAccess<'a> {
     pub read: Option<&'a [u8]>,
     /// What SubDevices have added to its working counter; `None` where it did not come back.
     pub wkc: Option<u16>,
+    /// What SubDevices have added to the working counter of this copy alone.
+    pub own: u16,
+    /// The card of a ring by which this copy had gone out; `None` where that is not known.
+    pub sent_by: Option<Path>,
     /// True if another copy of it came back before: in a ring each request goes out by both cards.
     pub is_further_copy: bool,
     /// When it came back, or went out if it did not.
@@ -96,6 +100,8 @@ impl<'a> DatagramAccess<'a> {
             written,
             read: (effect.reads && answer.own > 0).then(|| reply.data()),
             wkc: Some(answer.sum),
+            own: answer.own,
+            sent_by: answer.sent_by,
             is_further_copy,
             at: answer.at,
             frame: answer.frame,
@@ -157,6 +163,8 @@ fn lost<'a>(request: &FrameCopy<'a>, mut take: impl FnMut(&DatagramAccess<'a>)) 
             written: effect.writes.then(|| datagram.data()),
             read: None,
             wkc: None,
+            own: 0,
+            sent_by: None,
             is_further_copy: false,
             at: request.time,
             frame: request.number,

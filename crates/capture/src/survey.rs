@@ -1,12 +1,15 @@
 //! Survey of a capture: takes its frames beside a diagnosis, and reports what they show.
 
+use std::collections::BTreeMap;
+
+use linesman_config::profile::MappedPdo;
 use linesman_diagnosis::model::NetworkModel;
 use linesman_diagnosis::observe::Exchange;
 use linesman_diagnosis::observe::capture_probe::ProbePort;
 use linesman_diagnosis::report::Number;
 use linesman_diagnosis::rule::damage_at_probe::port_place;
 use linesman_diagnosis::{Engine, FrameSeen};
-use linesman_proto::address::Network;
+use linesman_proto::address::{DeviceId, Network};
 use linesman_proto::frame::FrameView;
 use linesman_proto::frame::size::wire_time;
 use linesman_proto::register::SmMode;
@@ -21,6 +24,7 @@ use crate::network::report::{
     CaptureReport, MailboxesReport, NetworkSummary, ProbePortReport, RecordingReport,
     ReferenceClockReport, SCHEMA,
 };
+use crate::network::ring::RingLog;
 use crate::network::states::{StateLog, named};
 use crate::network::{devices, image, unknown};
 use crate::timing::durations::{Durations, bars};
@@ -37,6 +41,7 @@ pub struct Survey {
     commands: CommandCounts,
     states: StateLog,
     counters: CounterPolls,
+    ring: RingLog,
     cyclic: CyclicFrames,
     dialogue: Dialogue,
     responses: Durations,
@@ -44,6 +49,8 @@ pub struct Survey {
     first: Option<Instant>,
     last: Instant,
     first_process_data: Option<Instant>,
+    /// PDOs of device descriptions.
+    described: BTreeMap<DeviceId, Vec<MappedPdo>>,
 }
 
 impl Survey {
@@ -55,6 +62,12 @@ impl Survey {
             self.last = self.last.max(frame.time);
         }
         engine.handle_frame_with(frame, &mut |model, exchange| self.exchange(model, exchange));
+    }
+
+    /// Takes the PDOs of a SubDevice by its device description, as they are assigned by default. They name its process
+    /// data where the frames themselves do not, and where they fit to its SyncManagers.
+    pub fn describe(&mut self, device: DeviceId, pdos: Vec<MappedPdo>) {
+        self.described.insert(device, pdos);
     }
 
     /// The capture has ended. `complete` is whether all of it could be read.
@@ -82,6 +95,7 @@ impl Survey {
             }
             self.states.access(access);
             self.counters.access(access);
+            self.ring.access(access);
             self.dialogue.access(model, access);
         });
         self.cyclic.exchange(exchange, counted);
@@ -97,6 +111,7 @@ impl Survey {
         let (cyclic, tasks) = self.cyclic.report(model);
         let (states, states_left_out) = self.states.report(model);
         let (transfers, transfers_left_out) = self.dialogue.report(model);
+        let image = image::reports(model, &self.dialogue, &self.described);
         Some(CaptureReport {
             schema: SCHEMA.to_owned(),
             tool: diagnosis.tool,
@@ -107,11 +122,11 @@ impl Survey {
             network: self.network(model),
             devices: devices::reports(model),
             links: devices::links(model),
+            ring: self.ring.report(model),
             commands: self.commands.report(),
             cyclic,
             first_process_data_ns: self.first_process_data.map(|at| Number(at.as_nanos())),
             tasks,
-            image: image::reports(model),
             states,
             states_left_out,
             counters: self.counters.report(model),
@@ -119,7 +134,8 @@ impl Survey {
             transfers_left_out,
             timing: self.timing(model),
             probe_ports: probe_ports(model),
-            unknown: unknown::reports(model, &recording),
+            unknown: unknown::reports(model, &recording, &image),
+            image,
             recording,
         })
     }

@@ -8,6 +8,7 @@ mod coe;
 mod eoe;
 mod foe;
 mod information;
+mod objects;
 mod report;
 mod soe;
 mod transfer;
@@ -19,11 +20,12 @@ use std::collections::BTreeMap;
 
 use linesman_diagnosis::model::NetworkModel;
 use linesman_diagnosis::report::Number;
-use linesman_proto::address::RegisterAddress;
+use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::mailbox::error_reply::ErrorReply;
 use linesman_proto::mailbox::{MailboxType, header};
 use linesman_proto::register::SmMode;
 
+pub(crate) use objects::PdoObjects;
 pub use report::{MailboxProtocol, TransferOutcome, TransferReport};
 pub use transfer::MailboxTransfer;
 
@@ -32,7 +34,7 @@ use eoe::Assemblies;
 use transfer::{SeenAt, Store};
 
 /// Process RAM begins here.
-const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
+pub(crate) const FIRST_RAM: RegisterAddress = RegisterAddress(0x1000);
 
 /// The dialogue of all mailboxes.
 #[derive(Clone, Default, Debug)]
@@ -105,6 +107,17 @@ impl Dialogue {
     #[must_use]
     pub fn mailboxes(&self) -> usize {
         self.mailboxes.len()
+    }
+
+    /// Objects that say what the process data of SubDevices consist of.
+    pub(crate) fn pdo_objects(&self, model: &NetworkModel) -> BTreeMap<DeviceId, PdoObjects> {
+        let mut all: BTreeMap<DeviceId, PdoObjects> = BTreeMap::new();
+        for transfer in self.store.transfers.iter().filter(|one| PdoObjects::concerns(one)) {
+            if let Some(id) = transfer.target.device(model) {
+                all.entry(id).or_default().learn(transfer);
+            }
+        }
+        all
     }
 
     /// The transfers in order of time, and how many were left out.

@@ -35,6 +35,8 @@ impl Bench {
             written: is_request.then_some(data),
             read: (!is_request && wkc > 0).then_some(data),
             wkc: Some(wkc),
+            own: wkc,
+            sent_by: None,
             is_further_copy: false,
             at: Instant::from_nanos(self.frame * 1_000),
             frame: self.frame,
@@ -254,4 +256,78 @@ fn bytes_of_chance_make_no_panic() {
         bench.bytes(&data, round % 2 == 0, 1);
     }
     assert!(!bench.transfers().is_empty());
+}
+
+/// Reads an object, whole or in part.
+fn reads(bench: &mut Bench, object: ObjectAddress, complete: bool, data: &[u8]) {
+    let size = data.len() as u32;
+    bench.asks(Request::Upload { object, complete });
+    let initial = Initial::Normal { size, data };
+    bench.answers(Response::Upload { object, complete, initial });
+}
+
+/// What the objects that the bench has seen say of SyncManager 3: PDO, and index, subindex and bits of its entries.
+fn assigned(bench: &Bench) -> Option<Vec<(u16, String, Vec<MappedPart>)>> {
+    let mut objects = PdoObjects::default();
+    let transfers = bench.dialogue.store.transfers.iter();
+    transfers.filter(|one| PdoObjects::concerns(one)).for_each(|one| objects.learn(one));
+    let pdos = objects.assigned(3)?.into_iter();
+    let parts = pdos.map(|pdo| {
+        let entries = pdo.entries.into_iter();
+        (
+            pdo.index,
+            pdo.name,
+            entries.map(|one| (one.index, one.subindex, one.bits, one.name)).collect(),
+        )
+    });
+    Some(parts.collect())
+}
+
+/// Index, subindex, bits and name of an entry.
+type MappedPart = (u16, u8, u16, String);
+
+#[test]
+fn pdos_of_a_sync_manager_are_read_from_their_objects_entry_by_entry_or_whole() {
+    let at = ObjectAddress::new;
+    let mut bench = Bench::new();
+    reads(&mut bench, at(0x1C13, 0), false, &[2]);
+    reads(&mut bench, at(0x1C13, 1), false, &[0x01, 0x1A]);
+    reads(&mut bench, at(0x1C13, 2), false, &[0x00, 0x1A]);
+    // The number of entries takes a word of its own: ETG.1000.6, complete access.
+    reads(&mut bench, at(0x1A01, 0), true, &[1, 0, 16, 0x11, 0x10, 0x60]);
+    assert_eq!(assigned(&bench), None, "0x1A00 was not read");
+    reads(&mut bench, at(0x1A00, 0), false, &[2]);
+    reads(&mut bench, at(0x1A00, 1), false, &[1, 1, 0x00, 0x60]);
+    reads(&mut bench, at(0x1A00, 2), false, &[7, 0, 0, 0]);
+    let name = ObjectDescription {
+        index: ObjectIndex(0x1A01),
+        data_type: DataType::UINT,
+        max_subindex: 1,
+        object_code: ObjectCode::Record,
+        name: b"Channel 2",
+    };
+    let mut told = [0; 64];
+    let len = name.write(&mut told).unwrap();
+    for fragment in info::Fragments::new(Answer::Object, &told[..len], 32) {
+        bench.told(MailboxType::Coe, false, |body| Message::Information(fragment).write(body));
+    }
+    let unnamed = String::new;
+    let channel = (0x1A01, "Channel 2".to_owned(), vec![(0x6010, 0x11, 16, unnamed())]);
+    let bits = vec![(0x6000, 1, 1, unnamed()), (0, 0, 7, unnamed())];
+    assert_eq!(assigned(&bench), Some(vec![channel, (0x1A00, unnamed(), bits)]));
+}
+
+#[test]
+fn assignment_that_is_written_holds_from_then_on() {
+    let mut bench = Bench::new();
+    reads(&mut bench, ObjectAddress::new(0x1C13, 0), true, &[1, 0, 0x00, 0x1A]);
+    reads(&mut bench, ObjectAddress::new(0x1A02, 0), true, &[1, 0, 8, 1, 0x20, 0x60]);
+    for (subindex, data) in [(0, &[0][..]), (1, &[0x02, 0x1A][..]), (0, &[1][..])] {
+        let object = ObjectAddress::new(0x1C13, subindex);
+        let initial = Initial::Expedited(Expedited::new(data).unwrap());
+        bench.asks(Request::Download { object, complete: false, initial });
+        bench.answers(Response::Download { object, complete: false });
+    }
+    let entry = (0x6020, 1, 8, String::new());
+    assert_eq!(assigned(&bench), Some(vec![(0x1A02, String::new(), vec![entry])]));
 }

@@ -1,11 +1,16 @@
 //! Process image: logical addresses that are sent again and again, and who owns which of their bits.
 
-use linesman_diagnosis::model::NetworkModel;
+use std::collections::BTreeMap;
+
+use linesman_config::profile::MappedPdo;
+use linesman_diagnosis::model::{Device, NetworkModel};
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::FmmuConfig;
 use serde::{Deserialize, Serialize};
 
 use super::devices::direction;
+use super::pdos::{DevicePdos, ImageEntryReport, MappedStretch, PdoSource};
+use crate::dialogue::Dialogue;
 
 /// A logical datagram.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -45,10 +50,26 @@ pub struct ImagePartReport {
     pub physical: u16,
     /// Number of the SyncManager there, where its set-up was seen.
     pub sync_manager: Option<u8>,
+    /// Source of `entries`; `null` where they are not known.
+    pub entries_by: Option<PdoSource>,
+    /// Entries of the PDOs that lie in it, in order.
+    pub entries: Vec<ImageEntryReport>,
 }
 
-/// All logical datagrams, each once.
-pub(crate) fn reports(model: &NetworkModel) -> Vec<ProcessImageReport> {
+/// All logical datagrams, each once. `described` are the PDOs of device descriptions.
+pub(crate) fn reports(
+    model: &NetworkModel,
+    dialogue: &Dialogue,
+    described: &BTreeMap<DeviceId, Vec<MappedPdo>>,
+) -> Vec<ProcessImageReport> {
+    let mut objects = dialogue.pdo_objects(model);
+    let mut pdos = |device: &Device| {
+        let described = described.get(&device.id).map_or(&[][..], Vec::as_slice);
+        DevicePdos::of(device, objects.remove(&device.id).unwrap_or_default(), described)
+    };
+    let mapped = model.devices.iter().filter(|device| !device.fmmus.is_empty());
+    let pdos: BTreeMap<DeviceId, DevicePdos<'_>> =
+        mapped.map(|device| (device.id, pdos(device))).collect();
     let mut all: Vec<ProcessImageReport> = Vec::new();
     for cyclic in &model.cyclic {
         let effect = cyclic.command.effect();
@@ -62,6 +83,14 @@ pub(crate) fn reports(model: &NetworkModel) -> Vec<ProcessImageReport> {
                 }
                 let physical = fmmu.physical_start.0.wrapping_add(overlap.fmmu_offset);
                 let (bit, bits) = bits(fmmu, overlap.fmmu_offset, overlap.length);
+                let inner = 8 * u32::from(overlap.fmmu_offset) + u32::from(bit);
+                let stretch = MappedStretch {
+                    from: physical_bit(fmmu, inner),
+                    bits,
+                    at: 8 * u32::from(overlap.datagram_offset) + u32::from(bit),
+                };
+                let known = pdos.get(&device.id).map(|pdos| pdos.entries(device, stretch));
+                let (entries_by, entries) = known.unwrap_or_default();
                 parts.push(ImagePartReport {
                     no: device.id.no(),
                     fmmu: *number,
@@ -70,7 +99,9 @@ pub(crate) fn reports(model: &NetworkModel) -> Vec<ProcessImageReport> {
                     bit,
                     bits,
                     physical,
-                    sync_manager: sync_manager(model, device.id, physical),
+                    sync_manager: sync_manager(device, physical),
+                    entries_by,
+                    entries,
                 });
             }
         }
@@ -102,11 +133,17 @@ fn bits(fmmu: &FmmuConfig, offset: u16, length: u16) -> (u8, u32) {
     (bit, (8 * u32::from(length)).saturating_sub(u32::from(bit) + behind))
 }
 
-fn sync_manager(model: &NetworkModel, id: DeviceId, physical: u16) -> Option<u8> {
-    let managers = &model.device(id)?.set_up.sync_managers;
+/// The physical bit, counted from address 0, that belongs to a bit of an FMMU, counted from its first logical byte.
+fn physical_bit(fmmu: &FmmuConfig, inner: u32) -> u32 {
+    let behind = inner.saturating_sub(u32::from(fmmu.logical_start_bit));
+    8 * u32::from(fmmu.physical_start.0) + u32::from(fmmu.physical_start_bit) + behind
+}
+
+/// Number of the SyncManager that holds a physical address.
+fn sync_manager(device: &Device, physical: u16) -> Option<u8> {
     let holds = |start: u16, length: u16| {
         physical >= start && u32::from(physical) < u32::from(start) + u32::from(length)
     };
-    let mut all = managers.iter();
+    let mut all = device.set_up.sync_managers.iter();
     all.find(|(_, config)| holds(config.start.0, config.length)).map(|(number, _)| *number)
 }

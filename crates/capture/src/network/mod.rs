@@ -5,6 +5,8 @@ pub mod counters;
 pub mod cyclic;
 pub mod devices;
 pub mod image;
+pub mod pdos;
 pub mod report;
+pub mod ring;
 pub mod states;
 pub mod unknown;

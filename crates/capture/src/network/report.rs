@@ -10,6 +10,7 @@ use super::counters::CountersReport;
 use super::cyclic::{CycleTaskReport, CyclicFrameReport};
 use super::devices::{SurveyedDevice, WiredLinkReport};
 use super::image::ProcessImageReport;
+use super::ring::RingReport;
 use super::states::StateEventReport;
 use super::unknown::UnknownReport;
 use crate::dialogue::TransferReport;
@@ -67,6 +68,8 @@ pub struct CaptureReport {
     pub devices: Vec<SurveyedDevice>,
     /// Links, as DL status tells them; empty where the wiring is not known.
     pub links: Vec<WiredLinkReport>,
+    /// The ring; `null` where the frames do not show two cards.
+    pub ring: Option<RingReport>,
     /// Datagrams by command.
     pub commands: Vec<CommandReport>,
     /// Frames that carry process data or the system time, in order of their first appearance.

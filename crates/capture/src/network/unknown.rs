@@ -3,7 +3,9 @@
 use linesman_diagnosis::model::{Device, NetworkModel};
 use serde::{Deserialize, Serialize};
 
+use super::image::ProcessImageReport;
 use super::report::RecordingReport;
+use crate::dialogue::FIRST_RAM;
 
 /// Something that is not known.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -22,7 +24,11 @@ pub struct UnknownReport {
 type LackRow = (&'static str, &'static str, fn(&Device) -> bool);
 
 /// A fact that is not known of a network.
-pub(crate) fn reports(model: &NetworkModel, recording: &RecordingReport) -> Vec<UnknownReport> {
+pub(crate) fn reports(
+    model: &NetworkModel,
+    recording: &RecordingReport,
+    image: &[ProcessImageReport],
+) -> Vec<UnknownReport> {
     let mut all = Vec::new();
     let mut note = |what: &str, why: &str, devices: Vec<u32>| {
         all.push(UnknownReport { what: what.to_owned(), why: why.to_owned(), devices });
@@ -88,5 +94,24 @@ pub(crate) fn reports(model: &NetworkModel, recording: &RecordingReport) -> Vec<
             Vec::new(),
         );
     }
+    let nameless = nameless(image);
+    if !nameless.is_empty() {
+        note(
+            "names of process data",
+            "neither a PDO assignment with its mappings (CoE 0x1C10 and up) nor PDOs of the SII that fit to the \
+             SyncManager were seen: name a device description with --esi",
+            nameless,
+        );
+    }
+    all
+}
+
+/// SubDevices with process data in memory of which no PDO is known. Registers have none.
+fn nameless(image: &[ProcessImageReport]) -> Vec<u32> {
+    let parts = image.iter().flat_map(|datagram| &datagram.parts);
+    let nameless = parts.filter(|part| part.entries_by.is_none() && FIRST_RAM.0 <= part.physical);
+    let mut all: Vec<u32> = nameless.map(|part| part.no).collect();
+    all.sort_unstable();
+    all.dedup();
     all
 }

@@ -191,6 +191,103 @@ fn type_of_a_subdevice_is_taken_from_a_device_description() {
     assert!(missing.stderr.contains("nowhere"), "{}", missing.stderr);
 }
 
+/// Entries of PDOs in the process image of a capture: SubDevice, source, and where they are with their names.
+fn entries(info: &Value) -> Vec<(u64, String, Vec<String>)> {
+    let parts = info["image"].as_array().unwrap().iter();
+    let parts = parts.flat_map(|datagram| datagram["parts"].as_array().unwrap());
+    let entry = |one: &Value| {
+        let text = |key: &str| one[key].as_str().unwrap_or("?").to_owned();
+        let (pdo, index) = (one["pdo"].as_u64().unwrap(), one["index"].as_u64().unwrap());
+        format!(
+            "{}.{}+{} {pdo:04X} {}/{index:04X}:{} {}",
+            one["byte"],
+            one["bit"],
+            one["bits"],
+            text("pdo_name"),
+            one["subindex"],
+            text("name")
+        )
+    };
+    parts
+        .map(|part| {
+            let by = part["entries_by"].as_str().unwrap_or("?").to_owned();
+            let entries = part["entries"].as_array().unwrap().iter().map(entry);
+            (part["no"].as_u64().unwrap(), by, entries.collect())
+        })
+        .collect()
+}
+
+#[test]
+fn bits_of_the_process_image_have_the_names_of_the_pdos_in_the_sii() {
+    let folder = TempDir::new().unwrap();
+    let (plant, path) = (folder.path().join("plant.toml"), folder.path().join("own.pcapng"));
+    let device = |name: &str, kind: &str, on: &str| {
+        format!("[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    let devices = [
+        device("K1", "EK1100", "maindevice"),
+        device("I1", "EL1008", "K1.B"),
+        device("A1", "EL3104", "I1.B"),
+    ];
+    fs::write(&plant, format!("name = \"names\"\nseed = 1\n{}", devices.concat())).unwrap();
+    let place = format!("sim:{}", plant.display());
+    let run = linesman(["diagnose", &place, "--seconds", "2", "--record", path.to_str().unwrap()]);
+    assert!(run.status <= 1, "{}", run.all());
+    let told = entries(&info(&path));
+    assert_eq!(told.len(), 2, "{told:?}");
+    let (digital, analogue) = (&told[0], &told[1]);
+    assert_eq!((digital.0, digital.1.as_str(), digital.2.len()), (2, "sii", 8), "{told:?}");
+    assert_eq!(digital.2[3], "0.3+1 1A03 Channel 4/6030:1 Input");
+    assert_eq!((analogue.0, analogue.1.as_str()), (3, "sii"), "{told:?}");
+    // Behind eight bits of inputs, and behind a status of 16 bits with gaps.
+    assert!(
+        analogue.2.contains(&"3.0+16 1A00 AI Standard Channel 1/6000:17 Value".to_owned()),
+        "{told:?}"
+    );
+    let text = linesman(["capture", "info", path.to_str().unwrap(), "--all"]);
+    assert!(
+        text.stdout.contains("0x1A00 AI Standard Channel 1  0x6000:11  Value"),
+        "{}",
+        text.stdout
+    );
+}
+
+#[test]
+fn names_that_the_sii_was_not_read_for_come_from_a_device_description() {
+    let Some(directory) = captures() else { return };
+    let path = directory.join("ec-replay-ek1100-el2828-el2889.pcapng");
+    let bare = entries(&info(&path));
+    // FMMUs of the terminal with sixteen outputs lead to two SyncManagers.
+    let lens: Vec<(u64, usize)> = bare.iter().map(|part| (part.0, part.2.len())).collect();
+    assert_eq!(lens, [(3, 8), (3, 8), (2, 8)], "{bare:?}");
+    assert_eq!(bare[2].2[1], "0.1+1 1601 ?/7010:1 ?");
+    let folder = TempDir::new().unwrap();
+    let esi = folder.path().join("esi.xml");
+    let pdo = |no: u16| {
+        format!(
+            "<RxPdo Fixed=\"1\" Sm=\"0\"><Index>#x{:04X}</Index><Name>Channel {}</Name><Entry><Index>#x{:04X}</Index>\
+             <SubIndex>1</SubIndex><BitLen>1</BitLen><Name>Output</Name><DataType>BOOL</DataType></Entry></RxPdo>",
+            0x1600 + no,
+            no + 1,
+            0x7000 + 16 * no
+        )
+    };
+    let pdos: String = (0..8).map(pdo).collect();
+    let described = format!(
+        "<EtherCATInfo><Vendor><Id>2</Id><Name>V</Name></Vendor><Descriptions><Groups/><Devices><Device Physics=\"YKY\">\
+         <Type ProductCode=\"#x0b0c3052\" RevisionNo=\"#x00110000\">EL2828</Type><Name>Eight outputs</Name>\
+         <Sm StartAddress=\"#x0f00\" ControlByte=\"#x44\" Enable=\"1\">Outputs</Sm>{pdos}\
+         <Eeprom><ByteSize>2048</ByteSize><ConfigData>0601</ConfigData></Eeprom></Device></Devices></Descriptions></EtherCATInfo>"
+    );
+    fs::write(&esi, described).unwrap();
+    let arguments = ["capture", "info", path.to_str().unwrap(), "--esi", esi.to_str().unwrap()];
+    let run = linesman([&arguments[..], &["--json"]].concat());
+    assert_eq!(run.status, 0, "{}", run.all());
+    let named = entries(&run.json());
+    assert_eq!(named[2].2[1], "0.1+1 1601 Channel 2/7010:1 Output", "{}", run.all());
+    assert_eq!(named[2].1, "sii", "the SubDevice itself says what is there");
+}
+
 #[test]
 fn line_that_nobody_answers_on_is_told_without_claims() {
     let Some(directory) = captures() else { return };

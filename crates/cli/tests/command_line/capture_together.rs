@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::support::linesman;
+use crate::support::{assert_valid, linesman};
+use serde_json::{Value, json};
 
 const RING: &str = r#"
 name = "ring"
@@ -89,6 +90,45 @@ fn network_of_a_ring_is_surveyed_from_captures_of_both_cards() {
     for request in asked {
         assert!(request["wkc"].as_u64() > Some(0), "somebody has taken it: {request}");
     }
+}
+
+#[test]
+fn halves_of_an_open_ring_are_told_with_their_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"I1.B-O1.A\"\nfrom_ms = 1500\n";
+    let (both, [a, b]) = recorded(folder.path(), cut);
+    let ring = |arguments: &[&str]| {
+        let run = linesman([&["capture", "info", "--json"], arguments].concat());
+        assert_eq!(run.status, 0, "{}", run.all());
+        let told = run.json();
+        assert_valid(&told, "capture");
+        told["ring"].clone()
+    };
+    let told = ring(&[&both]);
+    assert_eq!(ring(&["--together", &a, &b]), told);
+    let spells = told["open"].as_array().unwrap();
+    let last = spells.last().unwrap_or_else(|| panic!("{told}"));
+    let half = |card: &str| (last[card]["devices"].clone(), last[card]["count"].clone());
+    assert_eq!(half("card_a"), (json!([1, 2]), json!(2)), "{told}");
+    assert_eq!(half("card_b"), (json!([3, 4]), json!(2)), "{told}");
+    assert_eq!((&last["not_known"], &last["ended_ns"]), (&json!([]), &Value::Null), "{told}");
+    assert!(last["after_ns"].as_u64() < last["from_ns"].as_u64(), "{told}");
+    let text = linesman(["capture", "info", &both]);
+    for words in ["card A: SubDevice 1-2 (2 SubDevices answer broadcasts)", "card B: SubDevice 3-4"]
+    {
+        assert!(text.stdout.contains(words), "{words}: {}", text.stdout);
+    }
+}
+
+#[test]
+fn ring_that_stays_closed_has_no_halves_and_a_line_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let (both, [a, _]) = recorded(folder.path(), "");
+    let whole = linesman(["capture", "info", "--json", &both]).json();
+    assert_eq!(whole["ring"], json!({ "open": [], "left_out": 0 }));
+    // One card alone shows no second one.
+    let alone = linesman(["capture", "info", "--json", &a]).json();
+    assert_eq!(alone["ring"], Value::Null);
 }
 
 #[test]

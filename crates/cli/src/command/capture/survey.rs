@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use linesman_capture::network::unknown::UnknownReport;
 use linesman_capture::{CaptureReport, Survey};
+use linesman_diagnosis::report::DeviceReport;
 use linesman_diagnosis::{Engine, Setup};
 use linesman_link::capture::CaptureError;
 use linesman_link::input::{Content, Input};
@@ -40,7 +41,7 @@ pub(super) fn survey(
     stop: &Stop,
     output: &mut Output,
 ) -> Result<Surveyed, Failure> {
-    let library = esi.map(library).transpose()?;
+    let mut library = esi.map(library).transpose()?;
     let (path, mut capture) = match places {
         [place] => {
             let input = open(place, stop)?;
@@ -62,6 +63,9 @@ pub(super) fn survey(
     survey.finish(&mut engine, at, whole.is_complete);
     if engine.diagnosis().network.frames.0 == 0 {
         return Err(nothing_seen(&path, &capture, whole.frames));
+    }
+    if let Some(library) = &mut library {
+        describe_pdos(&mut survey, &engine, library, output);
     }
     let mut report =
         survey.report(&engine).ok_or_else(|| nothing_seen(&path, &capture, whole.frames))?;
@@ -146,6 +150,29 @@ fn library(place: &Path) -> Result<Library, Failure> {
         return Err(refuse(format!("{}: no device description is in it", place.display())));
     }
     Ok(library)
+}
+
+/// Tells the survey what the process data of SubDevices are by their descriptions.
+fn describe_pdos(survey: &mut Survey, engine: &Engine, library: &mut Library, output: &Output) {
+    let Some(model) = engine.model(Network::default()) else { return };
+    let mut refused = Vec::new();
+    for device in &model.devices {
+        let about = DeviceReport::of(device);
+        let (Some(vendor), Some(product)) = (about.vendor_id, about.product_code) else { continue };
+        if library.type_of(vendor, product, about.revision).is_none() {
+            continue;
+        }
+        match library.pdos_of(vendor, product, about.revision) {
+            Ok(pdos) => survey.describe(device.id, pdos),
+            Err(reason) if refused.contains(&reason) => {}
+            Err(reason) => {
+                output.warn(&format!(
+                    "{reason}; the process data of such SubDevices get no names of it"
+                ));
+                refused.push(reason);
+            }
+        }
+    }
 }
 
 /// Names the types of SubDevices by their descriptions.

@@ -2,7 +2,9 @@
 
 use linesman_capture::network::cyclic::{CyclicDatagramReport, CyclicFrameReport};
 use linesman_capture::network::image::ImagePartReport;
+use linesman_capture::network::pdos::PdoSource;
 use linesman_capture::timing::durations::BarReport;
+use linesman_proto::mailbox::coe::ObjectAddress;
 
 use super::{CaptureWriter, numbers};
 use crate::output::Table;
@@ -127,6 +129,50 @@ impl CaptureWriter<'_> {
             }
         }
         if is_any { self.section("Process image", &table.render()) } else { String::new() }
+    }
+
+    /// Entries of PDOs in the process image.
+    pub(super) fn entries(&self) -> String {
+        let headings =
+            ["datagram", "byte.bit", "bits", "SubDevice", "PDO", "entry", "name", "known by"];
+        let mut table = Table::new(&headings, self.paint);
+        let parts = self
+            .report
+            .image
+            .iter()
+            .flat_map(|datagram| datagram.parts.iter().map(move |part| (datagram, part)));
+        let all: Vec<_> = parts
+            .flat_map(|(datagram, part)| {
+                part.entries.iter().map(move |entry| (datagram, part, entry))
+            })
+            .collect();
+        let (shown, more) = self.shown(all.len(), "entries");
+        for (datagram, part, entry) in all.iter().take(shown) {
+            let pdo_name = entry.pdo_name.as_deref().unwrap_or_default();
+            table.row([
+                format!("{} 0x{:08X}", datagram.command, datagram.start),
+                format!("{}.{}", entry.byte, entry.bit),
+                entry.bits.to_string(),
+                self.names.device(part.no),
+                format!("0x{:04X} {pdo_name}", entry.pdo).trim_end().to_owned(),
+                ObjectAddress::new(entry.index, entry.subindex).to_string(),
+                entry.name.clone().unwrap_or_default(),
+                part.entries_by.map_or("", source).to_owned(),
+            ]);
+        }
+        match all.is_empty() {
+            true => String::new(),
+            false => self.section("Process data", &(table.render() + &more)),
+        }
+    }
+}
+
+/// Source of names, in the words of the set-up.
+const fn source(by: PdoSource) -> &'static str {
+    match by {
+        PdoSource::Coe => "CoE",
+        PdoSource::Sii => "SII",
+        PdoSource::Esi => "ESI",
     }
 }
 

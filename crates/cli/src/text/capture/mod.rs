@@ -4,6 +4,7 @@ mod cyclic;
 mod devices;
 mod dialogue;
 mod network;
+mod ring;
 
 use linesman_capture::CaptureReport;
 use linesman_proto::topology::Tree;
@@ -35,11 +36,13 @@ impl CaptureWriter<'_> {
             self.head(),
             self.devices(),
             self.wiring(tree),
+            self.ring(),
             self.set_up(),
             self.clocks(),
             self.frames(),
             self.jitter(),
             self.image(),
+            self.entries(),
             self.states(),
             self.transfers(),
             self.sii(),
