@@ -35,8 +35,12 @@ pub struct MailboxHistory {
     pub refusals: VecDeque<Seen<MailboxRefusal>>,
     /// Answers that took [`NOTABLE`] or longer, oldest first.
     pub slow: VecDeque<Seen<SlowAnswer>>,
-    /// The latest request that was taken is a fragment of an Ethernet frame (EoE), which nothing answers.
-    pub carries_frame: bool,
+    /// Fragments of Ethernet frames (EoE) that were taken since the latest answer: an error reply may be about one of
+    /// them, as nothing else answers a fragment.
+    pub fragments: u32,
+    /// Error replies that came while a request waits that was taken behind fragments: about them, if the request is
+    /// answered after all.
+    pub doubtful: VecDeque<Seen<ErrorReplyCode>>,
     /// Ethernet frames through it (EoE).
     pub ethernet: EthernetHistory,
     /// Messages of the diagnosis history (object 0x10F3) in the order in which they were read.
@@ -95,7 +99,7 @@ impl MailboxHistory {
         frame: u64,
     ) {
         self.reads_whole = reads_whole;
-        self.carries_frame = false;
+        self.settle_errors(false);
         if let Some((since, until)) = self.full.take() {
             self.note_stuck(since.at, until.max(at));
         }
@@ -108,7 +112,7 @@ impl MailboxHistory {
     /// A fragment of an Ethernet frame was taken, which nothing answers. Says whether the mailbox had been full for long
     /// enough to be worth a word.
     pub fn frame_taken(&mut self, at: Instant, frame: u64) -> bool {
-        self.carries_frame = true;
+        self.fragments = self.fragments.saturating_add(1);
         self.fetched();
         let Some((since, until)) = self.full.take() else { return false };
         self.note_stuck(since.at, until);
@@ -146,8 +150,45 @@ impl MailboxHistory {
         }
     }
 
-    /// An answer came. Says whether it took long enough to be worth a word.
+    /// The mailbox answered with an error, which does not name the message that it is about: a fragment that was taken
+    /// before, or the request that waits. Requests are answered in order.
+    pub fn error_reply(&mut self, code: ErrorReplyCode, at: Instant, frame: u64) {
+        let is_about_fragment = self.fragments > 0;
+        self.fragments = self.fragments.saturating_sub(1);
+        match (is_about_fragment, &self.waiting) {
+            (true, Some(_)) => push_kept(&mut self.doubtful, Seen::new(code, at, Some(frame))),
+            (true, None) => self.ethernet.refuse(code, at, frame),
+            (false, _) => {
+                self.answered(at, frame);
+                self.refused(MailboxRefusal::Error(code), at, frame);
+            }
+        }
+    }
+
+    /// It is known what the doubtful error replies were about: the last one was the answer to the request, if that did
+    /// not get another one.
+    fn settle_errors(&mut self, is_answered: bool) {
+        let mut doubtful = std::mem::take(&mut self.doubtful);
+        if !is_answered && let Some(last) = doubtful.pop_back() {
+            let refusal = MailboxRefusal::Error(last.value);
+            self.answered_by(last.at, last.frame.unwrap_or(0));
+            self.refused(refusal, last.at, last.frame.unwrap_or(0));
+        }
+        for seen in doubtful {
+            self.ethernet.refuse(seen.value, seen.at, seen.frame.unwrap_or(0));
+        }
+    }
+
+    /// An answer came. Says whether it tells of trouble: it took long, or fragments before it were refused.
     pub fn answered(&mut self, at: Instant, frame: u64) -> bool {
+        let were_doubtful = !self.doubtful.is_empty();
+        self.settle_errors(true);
+        self.fragments = 0;
+        self.answered_by(at, frame) || were_doubtful
+    }
+
+    /// The request that waits is answered. Says whether it took long enough to be worth a word.
+    fn answered_by(&mut self, at: Instant, frame: u64) -> bool {
         let Some(waiting) = self.waiting.take() else { return false };
         if at.since(waiting.at) < NOTABLE {
             return false;
@@ -186,3 +227,51 @@ impl MailboxHistory {
 
 /// A request that is not taken, or not answered, for so long: the mailbox is stuck.
 pub const STUCK: Span = Span::ms(900);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MEMORY: ErrorReplyCode = ErrorReplyCode::NoMemory;
+    const SERVICE: ErrorReplyCode = ErrorReplyCode::ServiceNotSupported;
+
+    fn at(ms: u64) -> Instant {
+        Instant::ZERO + Span::ms(ms)
+    }
+
+    /// Codes of refused fragments, and of refused requests.
+    fn refused(mailbox: &MailboxHistory) -> (Vec<ErrorReplyCode>, Vec<MailboxRefusal>) {
+        let fragments = mailbox.ethernet.refused.iter().map(|seen| seen.value);
+        (fragments.collect(), mailbox.refusals.iter().map(|seen| seen.value).collect())
+    }
+
+    #[test]
+    fn error_reply_between_a_request_and_its_answer_is_about_the_fragment_before_it() {
+        let mut mailbox = MailboxHistory::default();
+        mailbox.frame_taken(at(0), 1);
+        mailbox.asked(None, false, at(1), 2);
+        mailbox.error_reply(MEMORY, at(2), 3);
+        assert_eq!(refused(&mailbox), (vec![], vec![]), "it may be about either");
+        assert!(mailbox.answered(at(3), 4), "now it is known");
+        assert_eq!(refused(&mailbox), (vec![MEMORY], vec![]));
+        assert!(!mailbox.is_open());
+        // An error reply with no fragment before it answers the request.
+        mailbox.asked(None, false, at(4), 5);
+        mailbox.error_reply(SERVICE, at(5), 6);
+        assert_eq!(refused(&mailbox).1, [MailboxRefusal::Error(SERVICE)]);
+        assert!(!mailbox.is_open());
+    }
+
+    #[test]
+    fn last_error_reply_is_the_answer_where_no_other_one_comes() {
+        let mut mailbox = MailboxHistory::default();
+        mailbox.frame_taken(at(0), 1);
+        mailbox.frame_taken(at(1), 2);
+        mailbox.asked(None, false, at(2), 3);
+        mailbox.error_reply(MEMORY, at(3), 4);
+        mailbox.error_reply(SERVICE, at(4), 5);
+        mailbox.asked(None, false, at(2_000), 6);
+        assert_eq!(refused(&mailbox), (vec![MEMORY], vec![MailboxRefusal::Error(SERVICE)]));
+        assert!(mailbox.stuck.is_empty(), "it was answered by an error, not kept waiting");
+    }
+}

@@ -153,6 +153,7 @@ fn stuck(view: &View<'_>, device: &Device) -> Option<Condition> {
     }
     let waiting = mailbox
         .waiting
+        .filter(|_| mailbox.doubtful.is_empty())
         .zip(mailbox.polled)
         .map(|(waiting, polled)| (waiting.at, polled, waiting.frame))
         .filter(|(from, to, _)| to.since(*from) >= STUCK);

@@ -30,6 +30,7 @@ pub(crate) async fn send_frame(
     for fragment in fragments(frame, port, number, room) {
         let message = eoe::Message::Fragment(fragment);
         transaction.say(MailboxType::Eoe, |body| message.write(body)).await?;
+        transaction.multiplexer.fragment_sent();
         sent += 1;
         transaction.step = Step::Fragment(sent);
     }

@@ -30,6 +30,36 @@ const REPEAT_LIMIT: Span = Span::ms(100);
 /// waited for: cyclic frames may be lost.
 const UNSEEN: Span = Span::ms(50);
 
+/// A SubDevice may refuse a fragment of an Ethernet frame so long after it took it.
+const FRAGMENT_REFUSED_WITHIN: Span = Span::s(2);
+
+/// Fragments of Ethernet frames that a SubDevice may still refuse.
+///
+/// Nothing answers a fragment but an error reply, and that does not say which message it is about. Messages are answered
+/// in order: so many error replies as there are fragments before a request may be about those, and the next one is not.
+#[derive(Clone, Copy, Default, Debug)]
+struct UnansweredFragments {
+    count: u32,
+    /// When the last one was sent.
+    last: Instant,
+}
+
+impl UnansweredFragments {
+    fn sent(&mut self, now: Instant) {
+        *self = Self { count: self.count.saturating_add(1), last: now };
+    }
+
+    /// An error reply came. True if it may be about a fragment.
+    fn refused(&mut self, now: Instant) -> bool {
+        if now >= self.last + FRAGMENT_REFUSED_WITHIN {
+            self.count = 0;
+        }
+        let is_about_fragment = self.count > 0;
+        self.count = self.count.saturating_sub(1);
+        is_about_fragment
+    }
+}
+
 /// A register byte of one of the two SyncManagers.
 fn byte_of(manager: u16, at: u16) -> RegisterAddress {
     RegisterAddress(SYNC_MANAGER.address.0 + manager * SYNC_MANAGER.len + at)
@@ -60,6 +90,7 @@ pub(crate) struct Multiplexer {
     repetitions: u32,
     /// When a fragment of an Ethernet frame was sent or came.
     last_frame: Option<Instant>,
+    fragments: UnansweredFragments,
 }
 
 impl Multiplexer {
@@ -83,6 +114,7 @@ impl Multiplexer {
             passed: PassedTransfer::default(),
             repetitions: 0,
             last_frame: None,
+            fragments: UnansweredFragments::default(),
         })
     }
 
@@ -91,6 +123,7 @@ impl Multiplexer {
         (self.sent, self.received) = (None, Counter::NONE);
         (self.fetched_again, self.late) = (false, false);
         self.passed = PassedTransfer::default();
+        self.fragments = UnansweredFragments::default();
     }
 
     /// It is the mailbox of BOOT from now on, or that of all other states. False when it has none
@@ -114,6 +147,11 @@ impl Multiplexer {
     /// When a fragment of an Ethernet frame was sent or came; `None`: never.
     pub(crate) fn last_frame(&self) -> Option<Instant> {
         self.last_frame
+    }
+
+    /// A fragment of an Ethernet frame was sent.
+    pub(crate) fn fragment_sent(&mut self) {
+        self.fragments.sent(self.wire.now());
     }
 
     pub(crate) fn now(&self) -> Instant {
@@ -256,6 +294,10 @@ impl Multiplexer {
         loop {
             if let Some(buffer) = self.fetch().await? {
                 if let Some(data) = self.dispatch(&buffer, Some(kind))? {
+                    // What was sent before has been dealt with, unless this is the answer to a still earlier request.
+                    if !self.late {
+                        self.fragments = UnansweredFragments::default();
+                    }
                     return Ok(Some(data));
                 }
                 // A SubDevice that talks without end about other things is not listened to for ever.
@@ -376,8 +418,14 @@ impl Multiplexer {
                 Err(error) => self.found_rubbish(error.to_string()),
             },
             MailboxType::Error => match mailbox::ErrorReply::parse(message.data) {
-                Ok(reply) if wanted.is_some() => return Err(Why::Mailbox { code: reply.code }),
-                Ok(_) => {}
+                Ok(reply) => match (self.fragments.refused(self.wire.now()), wanted) {
+                    (false, Some(_)) => return Err(Why::Mailbox { code: reply.code }),
+                    (true, Some(_)) => self.found_rubbish(format!(
+                        "an error reply that may be about an Ethernet fragment: {}",
+                        reply.code
+                    )),
+                    (_, None) => {}
+                },
                 Err(error) => self.found_rubbish(error.to_string()),
             },
             MailboxType::Foe | MailboxType::Aoe | MailboxType::Voe if wanted == Some(kind) => {

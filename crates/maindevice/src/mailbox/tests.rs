@@ -2,7 +2,6 @@
 //! written down by hand.
 
 use std::collections::VecDeque;
-use std::pin::pin;
 use std::sync::{Arc, Mutex};
 use std::task::{Poll, Waker};
 
@@ -28,6 +27,8 @@ use crate::executor::Executor;
 use crate::options::Options;
 use crate::supervisor::DeviceTable;
 
+mod fragments;
+
 const ID: DeviceId = DeviceId(4);
 const OUT: u16 = 0x1000;
 const IN: u16 = 0x1080;
@@ -35,6 +36,7 @@ const OUT_STATUS: u16 = 0x0805;
 const IN_STATUS: u16 = 0x080D;
 const FULL: u8 = 0x08;
 
+const EOE: u8 = 2;
 const COE: u8 = 3;
 const FOE: u8 = 4;
 
@@ -52,7 +54,7 @@ enum Said {
 /// A mailbox of 32 bytes each way: 16 bytes of SDO data in a first message, 23 in a segment.
 fn device() -> DevicePlan {
     let areas = MailboxPair::from_words([OUT, 32, IN, 32]);
-    let protocols = Protocols(Protocols::COE | Protocols::FOE);
+    let protocols = Protocols(Protocols::COE | Protocols::EOE | Protocols::FOE);
     DevicePlan {
         name: "5".to_owned(),
         station: StationAddress(0x1005),
@@ -161,6 +163,12 @@ impl Scripted {
 
 /// Runs one operation to its end; gives what came of it, and what was told meanwhile.
 fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>) {
+    let (mut outcomes, events) = run_all(scripted, vec![request]);
+    (outcomes.remove(0), events)
+}
+
+/// Runs operations that are asked for at once to their end; gives what came of each, and what was told meanwhile.
+fn run_all(scripted: &mut Scripted, requests: Vec<MailboxRequest>) -> (Vec<Outcome>, Vec<Event>) {
     let mut executor = Executor::new();
     let wire = executor.group(0);
     let tree = linesman_proto::topology::derive(&[]).unwrap();
@@ -180,10 +188,11 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
         bad_rounds: Arc::default(),
         follows: None,
     };
-    let mut pending = pin!(mailboxes.ask(ID, request));
+    let mut pending: VecDeque<_> =
+        requests.into_iter().map(|request| Box::pin(mailboxes.ask(ID, request))).collect();
     wire.spawn(serve_mailbox(context, ID));
     let mut now = Instant::ZERO;
-    let mut events = Vec::new();
+    let (mut outcomes, mut events) = (Vec::new(), Vec::new());
     for _ in 0..100_000 {
         executor.run();
         let submitted = std::mem::take(&mut executor.shared().submitted);
@@ -194,8 +203,14 @@ fn run(scripted: &mut Scripted, request: MailboxRequest) -> (Outcome, Vec<Event>
         executor.run();
         events.extend(executor.shared().events.drain(..));
         let mut context = std::task::Context::from_waker(Waker::noop());
-        if let Poll::Ready(outcome) = pending.as_mut().poll(&mut context) {
-            return (outcome, events);
+        while let Some(first) = pending.front_mut()
+            && let Poll::Ready(outcome) = first.as_mut().poll(&mut context)
+        {
+            outcomes.push(outcome);
+            pending.pop_front();
+        }
+        if pending.is_empty() {
+            return (outcomes, events);
         }
         if executor.shared().submitted.is_empty() {
             now = executor.first_timer().max(now);

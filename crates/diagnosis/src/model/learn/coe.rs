@@ -27,17 +27,12 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
     let is_its = is_mailbox(device, ANSWERS, answer.ado);
     let is_new = is_its && device.mailbox.ethernet.count(header.counter);
     let news = match header.kind {
-        MailboxType::Error if device.mailbox.carries_frame => match ErrorReply::parse(body) {
-            Ok(reply) if is_new && body.len() == ErrorReply::LEN => {
-                device.mailbox.ethernet.refuse(reply.code, at, frame);
-                true
-            }
-            Ok(_) | Err(_) => false,
-        },
         MailboxType::Error => match ErrorReply::parse(body) {
-            Ok(reply) if body.len() == ErrorReply::LEN => {
-                device.mailbox.answered(at, frame);
-                device.mailbox.refused(MailboxRefusal::Error(reply.code), at, frame);
+            // One about a fragment that is fetched once more is no second one.
+            Ok(reply)
+                if body.len() == ErrorReply::LEN && (is_new || device.mailbox.fragments == 0) =>
+            {
+                device.mailbox.error_reply(reply.code, at, frame);
                 true
             }
             Ok(_) | Err(_) => false,
