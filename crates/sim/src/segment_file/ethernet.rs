@@ -39,8 +39,20 @@ pub struct SegmentEthernet {
 pub struct SegmentDatagrams {
     /// Bytes in each, 0 to 1,472.
     pub bytes: u16,
-    /// From one to the next, in ms, from 1.
+    /// So many at once, from 1 to 64; 1 unless said.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub burst: u16,
+    /// From one burst to the next, in ms, from 1.
     pub every_ms: u32,
+}
+
+const fn one() -> u16 {
+    1
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+const fn is_one(burst: &u16) -> bool {
+    *burst == 1
 }
 
 /// A computer at a port of a switch terminal. It answers ARP and ping, and has a web page.
@@ -81,14 +93,16 @@ impl SegmentEthernet {
         let datagrams = match (self.sends, address) {
             (None, _) => None,
             (Some(sends), HostAddress::Fixed { ip, .. })
-                if sends.bytes <= LONGEST_DATAGRAM && sends.every_ms > 0 =>
+                if sends.bytes <= LONGEST_DATAGRAM
+                    && sends.every_ms > 0
+                    && (1..=64).contains(&sends.burst) =>
             {
                 let every = Span::ms(sends.every_ms.into());
-                Some(UdpDatagrams { from: ip, bytes: sends.bytes, every })
+                Some(UdpDatagrams { from: ip, bytes: sends.bytes, burst: sends.burst, every })
             }
             (Some(_), HostAddress::Fixed { .. }) => {
                 return Err(format!(
-                    "`sends`: expected `bytes` from 0 to {LONGEST_DATAGRAM} and `every_ms` from 1"
+                    "`sends`: expected `bytes` from 0 to {LONGEST_DATAGRAM}, `every_ms` from 1 and `burst` from 1 to 64"
                 ));
             }
             (Some(_), HostAddress::None | HostAddress::Dhcp) => {

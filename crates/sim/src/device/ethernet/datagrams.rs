@@ -20,7 +20,9 @@ pub struct UdpDatagrams {
     pub from: [u8; 4],
     /// Bytes in each, at most [`LONGEST_DATAGRAM`].
     pub bytes: u16,
-    /// From one to the next.
+    /// So many at once; at least one.
+    pub burst: u16,
+    /// From one burst to the next.
     pub every: Span,
 }
 
@@ -30,11 +32,13 @@ pub(super) struct DatagramSource {
     what: UdpDatagrams,
     count: u16,
     due: Option<Instant>,
+    /// What is left of the burst.
+    left: u16,
 }
 
 impl DatagramSource {
     pub(super) const fn new(what: UdpDatagrams) -> Self {
-        Self { what, count: 0, due: None }
+        Self { what, count: 0, due: None, left: 0 }
     }
 
     /// When the next one is due.
@@ -42,14 +46,15 @@ impl DatagramSource {
         self.due
     }
 
-    /// The frame that is due, if there is one.
+    /// The next frame of those that are due, if there is one.
     pub(super) fn poll(&mut self, now: Instant, mac: MacAddress) -> Option<Vec<u8>> {
         let due = *self.due.get_or_insert(now + self.what.every);
-        if due > now {
-            return None;
+        if due <= now {
+            // What was missed meanwhile is not made up for.
+            self.due = Some(now + self.what.every);
+            self.left = self.what.burst.max(1);
         }
-        // What was missed meanwhile is not made up for.
-        self.due = Some(now + self.what.every);
+        self.left = self.left.checked_sub(1)?;
         self.count = self.count.wrapping_add(1);
         Some(self.frame(mac))
     }
@@ -87,7 +92,8 @@ mod tests {
 
     #[test]
     fn datagrams_come_at_their_times_with_a_right_header() {
-        let what = UdpDatagrams { from: [192, 168, 1, 11], bytes: 1_472, every: Span::ms(10) };
+        let every = Span::ms(10);
+        let what = UdpDatagrams { from: [192, 168, 1, 11], bytes: 1_472, burst: 1, every };
         let mut source = DatagramSource::new(what);
         let mac = MacAddress([2, 0, 0, 0, 0, 1]);
         assert_eq!(source.poll(Instant::ZERO, mac), None);
@@ -99,5 +105,11 @@ mod tests {
         let words = frame[14..34].chunks_exact(2);
         let sum: u32 = words.map(|two| u32::from(two[0]) << 8 | u32::from(two[1])).sum();
         assert_eq!((sum & 0xFFFF) + (sum >> 16), 0xFFFF, "check sum of the IP header");
+        let mut three = DatagramSource::new(UdpDatagrams { burst: 3, ..what });
+        let mut at = |ms| {
+            let now = Instant::ZERO + Span::ms(ms);
+            std::iter::from_fn(|| three.poll(now, mac)).count()
+        };
+        assert_eq!([0, 10, 15, 20].map(&mut at), [0, 3, 0, 3]);
     }
 }

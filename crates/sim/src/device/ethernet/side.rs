@@ -114,7 +114,9 @@ impl EthernetSide {
 
     /// Does what is to be done now.
     pub fn handle_timeout(&mut self, now: Instant) {
-        if let Some(frame) = self.datagrams.as_mut().and_then(|source| source.poll(now, self.mac)) {
+        while let Some(frame) =
+            self.datagrams.as_mut().and_then(|source| source.poll(now, self.mac))
+        {
             push(&mut self.sent, frame);
         }
         if let Some((own, _)) = &mut self.own {

@@ -1,6 +1,6 @@
 //! Web page of a virtual device: HTTP/1.0 over TCP port 80.
 //!
-//! `GET /` is a page that says who answers; `GET /bytes/N` so many bytes, for whoever wants to know how fast it goes.
+//! `GET /` is a page that says who answers; `GET /bytes/N` so many letters, for whoever wants to know how fast it goes.
 
 use smoltcp::iface::{SocketHandle, SocketSet};
 use smoltcp::socket::tcp;
@@ -129,8 +129,11 @@ impl WebAnswer {
             return len;
         }
         let len = usize::try_from(self.filling).unwrap_or(usize::MAX).min(room.len());
-        room[..len].fill(b'.');
-        self.filling -= len as u64;
+        // Letters by how many are left, so that whoever gets them sees one that is missing or doubled.
+        for slot in &mut room[..len] {
+            *slot = b'a' + (self.filling % 26) as u8;
+            self.filling -= 1;
+        }
         len
     }
 }
