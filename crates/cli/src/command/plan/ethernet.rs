@@ -71,7 +71,7 @@ struct EthernetPlanRate {
     fragments: usize,
     /// Time that one message takes.
     message_ns: u64,
-    /// What limits it: `cycle` or `bandwidth`.
+    /// What limits it: `cycle`, `bandwidth`, or `subdevice`, which is taken to need 600 µs for a message.
     limit: &'static str,
     /// Data of a TCP connection.
     bytes_per_second: u64,
@@ -112,6 +112,7 @@ impl EthernetPlanArguments {
                         limit: match rate.limit {
                             RateLimit::Cycle => "cycle",
                             RateLimit::Bandwidth => "bandwidth",
+                            RateLimit::SubDevice => "subdevice",
                         },
                         bytes_per_second: rate.bytes_per_second,
                     },

@@ -13,7 +13,7 @@ use linesman_proto::sii::Protocols;
 use super::{DevicePlan, Doubt, Plan, Severity};
 use crate::start_up::StartUpAction;
 
-pub use rate::{EthernetRate, RateLimit};
+pub use rate::{ACYCLIC_FRAMES, EthernetRate, RateLimit};
 pub use route::{EthernetRoute, RouteStep};
 pub use subnet::Subnet;
 

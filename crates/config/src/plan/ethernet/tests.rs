@@ -139,8 +139,12 @@ fn throughput_follows_from_mailbox_cycle_and_free_bandwidth() {
         assert_eq!(rates.len(), 2, "to it and from it");
         (rates[0].bytes_per_second, rates[0].limit)
     };
-    // Two fragments, one a cycle.
-    assert_eq!(rate(1_024, 1_000, &[60]), (730_000, RateLimit::Cycle));
+    // Two fragments: limited by the 600 µs that the SubDevice is taken to need for each; from it two a cycle.
+    let (to, limit) = rate(1_024, 1_000, &[60]);
+    assert_eq!(limit, RateLimit::SubDevice);
+    assert!((900_000..1_100_000).contains(&to), "{to}");
+    let from = rates(1_024, Span::us(1_000), &[60])[1];
+    assert_eq!((from.bytes_per_second / 10_000, from.limit), (146, RateLimit::Cycle));
     for (mailbox, us) in [(512, 500), (1_024, 1_000), (1_024, 500), (1_024, 250), (1_486, 250)] {
         let (bytes, _) = rate(mailbox, us, &[60]);
         assert!((300_000..=3_000_000).contains(&bytes), "{mailbox} bytes, {us} µs: {bytes}");
