@@ -1,5 +1,6 @@
 //! Options of a MainDevice that its user chooses.
 
+use linesman_config::plan::ethernet::ACYCLIC_FRAMES;
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::state::StateTimeouts;
 use linesman_proto::time::{DcTime, Span};
@@ -144,7 +145,7 @@ impl Default for Options {
             ring: false,
             patience: Span::ms(10),
             repeats: 3,
-            frames_at_once: 4,
+            frames_at_once: ACYCLIC_FRAMES,
             allowed_misses: None,
             polling: Polling::default(),
             watch_interval: Span::ms(100),

@@ -80,6 +80,8 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
     let Some(mut multiplexer) = Multiplexer::new(wire, mailboxes, device) else { return };
     let mut openings = 0;
     let mut kept_for: Option<KeptFor> = None;
+    // Messages were left in the mailbox, so that jobs get their turn.
+    let mut is_full = false;
     loop {
         let now = context.wire.now();
         kept_for = kept_for.filter(|kept| now < kept.until);
@@ -93,6 +95,7 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
             true => interval.min(FRAME_INTERVAL),
             false => interval,
         };
+        let interval = if std::mem::take(&mut is_full) { Span::ZERO } else { interval };
         let client = kept_for.map(|kept| kept.client);
         let job = mailboxes.next(id, client, context.wire.sleep(interval)).await;
         let (open, boots, now) = {
@@ -119,7 +122,7 @@ pub(crate) async fn serve_mailbox(context: Context, id: DeviceId) {
                 let (under_way, now) = (multiplexer.is_passing(), context.wire.now());
                 kept_for = KeptFor::after(kept_for, client, under_way, now);
             }
-            None if open => multiplexer.drain().await,
+            None if open => is_full = multiplexer.drain().await,
             // What is left of an earlier run is of no interest, and must not be looked at for ever.
             None => {
                 mailboxes.take_full(id);

@@ -318,16 +318,17 @@ impl Multiplexer {
         }
     }
 
-    /// Fetches and hands on what is there.
-    pub(crate) async fn drain(&mut self) {
+    /// Fetches and hands on what is there. True if there may be more.
+    pub(crate) async fn drain(&mut self) -> bool {
         // A SubDevice that talks without end must not keep its jobs waiting.
         for _ in 0..16 {
             match self.fetch().await {
                 // Nobody waits for an error reply, either.
                 Ok(Some(buffer)) => drop(self.dispatch(&buffer, None)),
-                Ok(None) | Err(_) => return,
+                Ok(None) | Err(_) => return false,
             }
         }
+        true
     }
 
     /// The message in the mailbox, if there is a new one.

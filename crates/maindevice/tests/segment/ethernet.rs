@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use linesman_config::plan::layout::TaskOptions;
-use linesman_config::plan::{Plan, PlanOptions};
 use linesman_maindevice::Event;
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{Service, ServiceAnswer};
@@ -360,74 +358,4 @@ fn frames_arrive_whole_though_ethercat_frames_are_lost() {
     // A fragment that got lost when the next one was in the mailbox already cannot be fetched again.
     assert!(came >= 34, "{came} of 40");
     assert!(office.repetitions > 0);
-}
-
-/// A device with an IP stack and a mailbox of 1,024 bytes, and one with 256.
-const TWO_MAILBOXES: &str = r#"
-name = "office"
-[[device]]
-name = "K1"
-type = "EK1100"
-on = "maindevice"
-[[device]]
-name = "W1"
-type = "EL6688"
-on = "K1.B"
-ethernet = { ip = "192.168.1.11/24" }
-[[device]]
-name = "B1"
-type = "EL6692"
-on = "W1.B"
-ethernet = { ip = "192.168.1.12/24" }
-"#;
-
-/// What a device sends in a second with this cycle, and what was estimated: data of frames of 1,514 bytes, which answer
-/// as many pings.
-fn carried(name: &str, cycle: Span) -> (f64, f64) {
-    const FRAMES: usize = 60;
-    let mut bench = Bench::new(TWO_MAILBOXES);
-    let inventory = bench.scan();
-    let tasks = vec![TaskOptions::new("t", cycle)];
-    let options = PlanOptions { tasks, ..PlanOptions::default() };
-    let plan = Plan::build(&inventory.planned(AlState::Op), inventory.tree().clone(), &options);
-    let plan = plan.expect("a plan");
-    let id = bench.id(name);
-    let mut rates = plan.ethernet_rates().into_iter();
-    let estimated = rates.find(|rate| rate.device == id && rate.from_device).expect("a rate");
-    bench.device.start(bench.now, plan);
-    assert!(bench.run_until(Span::s(30), |event| matches!(event, Event::AllReached)));
-    let began = bench.now;
-    let no = id.no() as u8;
-    let mac = [0x02, 0x4C, 0x4D, 0, no, 0];
-    let question = arp_request([192, 168, 1, 9 + no]);
-    let ping = echo_request(mac, [192, 168, 1, 9 + no], &[0; 1_472]);
-    for (number, frame) in (0..).zip([question].into_iter().chain(vec![ping; FRAMES])) {
-        let request = MailboxRequest::SendFrame { port: 0, number: number & 0x0F, frame };
-        bench.device.serve(bench.now, id, Service::Mailbox(request));
-    }
-    let (mut port, mut came) = (SubDevicePort::default(), 0);
-    let all = bench.run_until(Span::s(60), |event| {
-        if let Event::Mailbox { kind: MailboxType::Eoe, data, .. } = event {
-            let frame = port.handle_message(data);
-            came += usize::from(frame.is_some_and(|frame| frame.len() == 1_514));
-        }
-        came == FRAMES
-    });
-    assert!(all, "{came} of {FRAMES} came");
-    let seconds = bench.now.since(began).as_nanos() as f64 / 1e9;
-    ((FRAMES * 1_460) as f64 / seconds, estimated.bytes_per_second as f64)
-}
-
-// S0 L2899-2922.
-// proves: EOE-08 (S) partial: a wire with little time left is only calculated, in config::plan::ethernet
-#[test]
-fn throughput_grows_with_the_mailbox_and_with_a_shorter_cycle_as_estimated() {
-    let cases = [("W1", 1), ("W1", 2), ("W1", 4), ("B1", 1), ("B1", 2)];
-    let measured = cases.map(|(name, ms)| carried(name, Span::ms(ms)));
-    for ((name, ms), (carried, estimated)) in cases.iter().zip(measured) {
-        let ratio = carried / estimated;
-        assert!((0.6..=1.6).contains(&ratio), "{name}, {ms} ms: {measured:?}");
-    }
-    let [w1, w2, w4, b1, _] = measured.map(|(carried, _)| carried);
-    assert!(w1 > w2 && w2 > w4 && w1 > b1, "{measured:?}");
 }

@@ -9,6 +9,8 @@ mod clocks;
 mod delays;
 mod described;
 mod ethernet;
+#[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
+mod ethernet_rate;
 mod hot_connect;
 mod identity;
 mod library;
