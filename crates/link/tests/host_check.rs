@@ -299,7 +299,7 @@ fn network_settings_are_checked_one_by_one() {
         if let Some((path, text)) = change {
             write(folder.path(), path, text);
         }
-        inspect_network(&Files::below(folder.path()), Some(interface))
+        inspect_network(&Files::below(folder.path()), Some(interface), None)
     };
     let well = judged(None, "eoe0");
     assert!(well.iter().all(|check| check.outcome == Outcome::Good), "{well:#?}");

@@ -6,7 +6,9 @@ mod jitter;
 
 use std::path::PathBuf;
 
-use linesman_link::host_check::{Check, DriverSettings, Files, Outcome, inspect, inspect_network};
+use linesman_link::host_check::{
+    Check, DriverSettings, Files, FirewallRules, Outcome, inspect, inspect_network,
+};
 use linesman_link::interface::{self, InterfaceKind};
 use linesman_proto::time::Span;
 use serde::Serialize;
@@ -100,10 +102,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let cards = cards(arguments)?;
     let mut checks = inspect(&files, &cards);
     if let Some(interface) = &arguments.eoe {
-        checks.extend(inspect_network(
-            &files,
-            Some(interface.as_str()).filter(|name| !name.is_empty()),
-        ));
+        // Rules of another computer are in no file.
+        let rules = arguments.root.is_none().then(FirewallRules::ask);
+        let interface = Some(interface.as_str()).filter(|name| !name.is_empty());
+        checks.extend(inspect_network(&files, interface, rules.as_ref()));
     }
     let jitter = arguments.measure.map(|lasts| jitter::measure(arguments.cycle_us, lasts));
     let worst = checks.iter().map(|check| check.outcome).max();

@@ -10,6 +10,7 @@
 
 mod card;
 mod files;
+mod firewall;
 mod kernel;
 mod machine;
 mod network;
@@ -20,6 +21,7 @@ use std::fmt;
 
 pub use card::DriverSettings;
 pub use files::Files;
+pub use firewall::FirewallRules;
 
 /// What a check is about.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -131,8 +133,12 @@ pub fn inspect(files: &Files, cards: &[(String, DriverSettings)]) -> Vec<Check> 
 }
 
 /// Checks of the network settings that Ethernet over EtherCAT needs (EOE-13); `interface` is the one of `run --eoe`, if there is
-/// one to look at.
+/// one to look at, and `rules` those of a firewall, if they were asked for.
 #[must_use]
-pub fn inspect_network(files: &Files, interface: Option<&str>) -> Vec<Check> {
-    network::checks(files, interface)
+pub fn inspect_network(
+    files: &Files,
+    interface: Option<&str>,
+    rules: Option<&FirewallRules>,
+) -> Vec<Check> {
+    network::checks(files, interface, rules)
 }

@@ -2,6 +2,7 @@
 //!
 //! Reference: S0 L2985-3067 (EOE-13); `networking/ip-sysctl.rst` of Linux, proc(5) (`/proc/net/route`), capabilities(7).
 
+use super::firewall::{self, FirewallRules};
 use super::{Area, Check, Files, Outcome};
 use crate::error::this_program;
 
@@ -12,9 +13,13 @@ const UP: u32 = 0x1;
 const GATEWAY: u32 = 0x2;
 
 /// Checks of what frames between SubDevices and other computers need; `interface` is the one of `run --eoe`.
-pub(super) fn checks(files: &Files, interface: Option<&str>) -> Vec<Check> {
+pub(super) fn checks(
+    files: &Files,
+    interface: Option<&str>,
+    rules: Option<&FirewallRules>,
+) -> Vec<Check> {
     let mut checks = vec![rights(files), device(files), forwarding(files), echo(files)];
-    checks.push(firewall(files));
+    checks.push(firewall::check(files, rules));
     checks.push(routes(files, interface));
     if let Some(interface) = interface {
         checks.push(reverse_path(files, interface));
@@ -86,29 +91,6 @@ fn echo(files: &Files) -> Check {
                 .mend("sudo sysctl -w net.ipv4.icmp_echo_ignore_all=0")
         }
     }
-}
-
-/// What rules say is known to `nft` alone; whether there are any, files tell.
-fn firewall(files: &Files) -> Check {
-    const NAME: &str = "firewall";
-    let modules = files.text("proc/modules");
-    let old = files.text("proc/net/ip_tables_names");
-    let old = old.unwrap_or_default().split_whitespace().any(|table| table == "filter");
-    let new = modules.as_deref().unwrap_or_default().lines().any(|line| {
-        let mut words = line.split_whitespace();
-        // The third word counts users: rules.
-        words.next() == Some("nf_tables") && words.nth(1).is_some_and(|users| users != "0")
-    });
-    if modules.is_none() && !old {
-        return Check::unknown(Area::Network, NAME, "/proc/modules does not tell");
-    }
-    if !old && !new {
-        return Check::good(Area::Network, NAME, "no rules of a firewall are loaded");
-    }
-    Check::new(Area::Network, NAME, Outcome::Doubtful, "rules of a firewall are loaded")
-        .effect("they may stop pings, and packets between the LAN and SubDevices")
-        .mend("sudo nft list ruleset   # shows them: chains input and forward, icmp type echo-request")
-        .mend("sudo nft insert rule ip filter FORWARD iifname eoe0 accept   # and the same with oifname; as your rules are called")
 }
 
 fn routes(files: &Files, interface: Option<&str>) -> Check {
