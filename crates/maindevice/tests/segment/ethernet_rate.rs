@@ -85,16 +85,12 @@ fn carried(name: &str, from: bool, us: u64, fillers: &[usize]) -> (f64, Ethernet
         bench.events.clear();
         let mut done = 0;
         bench.run_until(left, |event| {
-            match event {
-                Event::Mailbox { kind: MailboxType::Eoe, data, .. } => {
-                    let frame = port.handle_message(data);
-                    came += usize::from(frame.is_some_and(|frame| frame.len() == 1_514));
-                }
-                Event::Served { result, .. } => {
-                    assert!(result.is_ok(), "{result:?}");
-                    done += 1;
-                }
-                _ => {}
+            if let Event::Mailbox { kind: MailboxType::Eoe, data, .. } = event {
+                let frame = port.handle_message(data);
+                came += usize::from(frame.is_some_and(|frame| frame.len() == 1_514));
+            } else if let Event::Served { result, .. } = event {
+                assert!(result.is_ok(), "{result:?}");
+                done += 1;
             }
             done > 0
         });
