@@ -41,6 +41,8 @@ def pyetg1510_lists_diagnoses_and_counts_through_the_gateway(line):
         assert state["ALStatus"] == OP and state["ALStatusCode"] == 0, (name, state)
         assert sum(state["FrameErrorCounterPort"]) == 0, (name, state)
     assert objects["f120"]["CyclicFramesPerSecond"] > 0, objects["f120"]
+    # Commands: none was given, and counts were not reset.
+    assert objects["f002"]["ScanCommandStatus"] == 0 and not objects["f200"]["ResetDiagInfo"], objects
     recording.judge(line)
 
 

@@ -1,7 +1,7 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
 pub(super) mod ethernet;
-mod gateway;
+pub(super) mod gateway;
 mod reporter;
 
 use std::path::{Path, PathBuf};

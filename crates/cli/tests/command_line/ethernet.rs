@@ -165,7 +165,7 @@ fn computer_in_another_subnet_reaches_a_device_by_the_routes_that_are_printed() 
 }
 
 // S0 L2985-3067.
-// proves: EOE-13 partial: rules of a firewall are seen to be loaded, none was tried
+// proves: EOE-13
 #[test]
 fn host_is_checked_for_what_ethernet_over_ethercat_needs() {
     let script = r#"
@@ -184,9 +184,23 @@ print("firewall" in checks)' $2 $3 $4 $5 $6
     echo 0 > /proc/sys/net/ipv4/icmp_echo_ignore_all
     check eoe0 forwarding ping-answers
     check eoe7 routes
+    # A rule that drops pings, tried: the ping fails, the check names the rule, and without it both are well.
+    if command -v nft > /dev/null && nft list ruleset > /dev/null 2>&1; then
+        ip link set lo up
+        nft add table inet tried
+        nft add chain inet tried input '{ type filter hook input priority 0; }'
+        nft add rule inet tried input icmp type echo-request drop
+        check eoe0 firewall
+        python3 $DIRECTORY/ping.py 127.0.0.1
+        nft delete table inet tried
+        check eoe0 firewall
+        python3 $DIRECTORY/ping.py 127.0.0.1
+    else
+        echo "no nft"
+    fi
 "#;
     let Some(run) = beside_office(script) else { return };
-    let expected = [
+    let mut expected = vec![
         "interface-rights good -",
         "tap-interfaces good -",
         "forwarding doubtful sudo sysctl -w net.ipv4.ip_forward=1",
@@ -198,8 +212,19 @@ print("firewall" in checks)' $2 $3 $4 $5 $6
         "True",
         "routes doubtful sudo ip address add 192.168.1.100/24 dev eoe7",
         "True",
-        "counted",
     ];
+    match run.stdout.contains("no nft") {
+        true => expected.extend(["no nft"]),
+        false => expected.extend([
+            "firewall doubtful sudo nft list ruleset",
+            "True",
+            "ping 127.0.0.1 0 of 4",
+            "firewall good -",
+            "True",
+            "ping 127.0.0.1 4 of 4",
+        ]),
+    }
+    expected.push("counted");
     assert_eq!(run.stdout.lines().collect::<Vec<_>>(), expected, "{}", run.all());
 }
 

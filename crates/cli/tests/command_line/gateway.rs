@@ -1,5 +1,6 @@
 //! Mailbox gateway of a run: other programs ask SubDevices and the MainDevice by UDP and TCP.
 
+mod objects;
 mod protocols;
 
 use std::collections::BTreeMap;
@@ -463,7 +464,11 @@ fn gateway_for_other_computers_needs_an_allow_list() {
         "{}",
         ran.stdout
     );
-    assert!(ran.stdout.contains("Mailbox gateway: 0 requests, 0 answers."), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains("Mailbox gateway: 0 requests of 0 clients, 0 answers."),
+        "{}",
+        ran.stdout
+    );
 }
 
 #[test]
@@ -631,7 +636,7 @@ fn client_in_another_subnet_is_served_and_one_that_is_not_on_the_list_is_not() {
         "udp 1002 5 43 1018:1 2",
         "tcp 1003 5 43 1018:4 3",
         "silence",
-        "Mailbox gateway: 3 requests, 2 answers, 1 refused or not answered (not-allowed 1).",
+        "Mailbox gateway: 3 requests of 2 clients, 2 answers, 1 refused or not answered (not-allowed 1).",
     ];
     assert_eq!(run.stdout.lines().collect::<Vec<_>>(), expected, "{}", run.all());
 }
@@ -645,7 +650,7 @@ fn programs_of_others_ask_a_line_on_a_cable() {
         "tcp 1002 5 43 1018:1 2",
         "mixed 0",
         "silence",
-        "Mailbox gateway: 144 requests, 142 answers, 2 refused or not answered (too-long 1, unknown-station 1).",
+        "Mailbox gateway: 144 requests of 3 clients, 142 answers, 2 refused or not answered (too-long 1, unknown-station 1).",
     ];
     assert_eq!(run.stdout.lines().collect::<Vec<_>>(), expected, "{}", run.all());
 }

@@ -112,6 +112,11 @@ impl GatewayClients {
         Arc::new(GatewayClient { id, waiting: AtomicUsize::default() })
     }
 
+    /// How many there were so far.
+    pub(super) fn count(&self) -> u64 {
+        self.next.load(Ordering::Relaxed).saturating_sub(1)
+    }
+
     /// A place among the requests that wait for their answers; `None` when this client, or all together, have
     /// enough of them.
     pub(super) fn place(&self, client: &Arc<GatewayClient>) -> Option<WaitingPlace> {

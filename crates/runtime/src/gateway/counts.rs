@@ -98,6 +98,7 @@ impl GatewayCounts {
         GatewayReport {
             listen: listen.to_string(),
             read_only,
+            clients: 0,
             requests: number(&self.requests),
             answers: number(&self.answers),
             refused: refused.filter(|(_, count)| *count > 0).collect(),
@@ -114,6 +115,10 @@ pub struct GatewayReport {
     pub listen: String,
     /// Whether only what changes nothing is passed on.
     pub read_only: bool,
+    /// Clients that have asked so far: senders of datagrams (one that was silent for long counts anew), and
+    /// connections.
+    #[serde(default)]
+    pub clients: u64,
     /// Datagrams, and frames of connections, that came in.
     pub requests: u64,
     /// Mailbox messages that went out.

@@ -10,6 +10,7 @@
 //! cannot be served is not answered, as the specification has it.
 
 mod admission;
+mod commands;
 mod counts;
 mod object_thread;
 mod objects;
@@ -19,6 +20,7 @@ mod server;
 mod tcp;
 mod udp;
 
+use std::fmt;
 use std::io;
 use std::net::{SocketAddr, TcpListener, UdpSocket};
 use std::sync::Arc;
@@ -45,6 +47,22 @@ const PER_SUBDEVICE: usize = 16;
 /// How often a port is looked for that is free for UDP and TCP.
 const ATTEMPTS: usize = 16;
 
+/// Counts of a gateway, for those who look on.
+#[derive(Clone)]
+pub(crate) struct GatewayWatch(Arc<GatewayServer>);
+
+impl GatewayWatch {
+    pub(crate) fn report(&self) -> GatewayReport {
+        self.0.report()
+    }
+}
+
+impl fmt::Debug for GatewayWatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("GatewayWatch").field("listen", &self.0.listen).finish_non_exhaustive()
+    }
+}
+
 /// The gateway, as the thread that runs the line knows it. It is closed when this is dropped.
 pub struct MailboxGateway {
     server: Arc<GatewayServer>,
@@ -69,6 +87,7 @@ impl MailboxGateway {
         let listen = socket.local_addr()?;
         let (server, requests) = GatewayServer::new(options, listen, wake_handle);
         let server = Arc::new(server);
+        online.set_gateway(GatewayWatch(Arc::clone(&server)));
         let objects = object_thread::start(Arc::clone(&server), online)?;
         udp::start(socket, Arc::clone(&server), objects.clone())?;
         tcp::start(listener, Arc::clone(&server), objects)?;

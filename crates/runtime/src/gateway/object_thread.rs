@@ -13,11 +13,13 @@ use linesman_sim::device::dictionary::Dictionary;
 use linesman_sim::device::mailbox::ObjectServer;
 
 use super::admission::WAITING;
+use super::commands::ObjectCommands;
 use super::counts::GatewayRefusal;
 use super::objects::dictionary;
 use super::screen::error_reply;
 use super::server::{GatewayRequest, GatewayServer, ObjectRequest};
 use crate::online::OnlineState;
+use crate::online::report::OnlineReport;
 use crate::part::guard;
 
 /// So long the objects are as they were: the thread that runs the line is asked no more often.
@@ -33,10 +35,18 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 struct ObjectThread {
     server: Arc<GatewayServer>,
     online: OnlineState,
-    /// The objects, and when they were made.
-    dictionary: Option<(Dictionary, Instant)>,
+    /// The objects, of which report they were made, and when.
+    made: Option<MadeObjects>,
+    /// What clients have written into them.
+    commands: ObjectCommands,
     /// The transfer of each client, and when it asked last.
     clients: BTreeMap<u64, (ObjectServer, Instant)>,
+}
+
+struct MadeObjects {
+    dictionary: Dictionary,
+    report: OnlineReport,
+    at: Instant,
 }
 
 /// Starts the thread; gives the way to it.
@@ -45,7 +55,9 @@ pub(super) fn start(
     online: OnlineState,
 ) -> io::Result<SyncSender<ObjectRequest>> {
     let (sender, requests) = mpsc::sync_channel(WAITING);
-    let mut thread = ObjectThread { server, online, dictionary: None, clients: BTreeMap::new() };
+    let commands = ObjectCommands::default();
+    let mut thread =
+        ObjectThread { server, online, made: None, commands, clients: BTreeMap::new() };
     thread::Builder::new().name("gateway objects".to_owned()).spawn(move || {
         // It is begun anew: nothing of it is worth keeping.
         while !thread.server.closed.load(Ordering::Acquire) {
@@ -81,7 +93,9 @@ impl ObjectThread {
 
     fn answer(&mut self, client: u64, data: &[u8]) -> Result<Vec<u8>, GatewayRefusal> {
         self.refresh()?;
-        let Some((dictionary, _)) = &mut self.dictionary else { return Err(GatewayRefusal::NotUp) };
+        let Some(MadeObjects { dictionary, report, .. }) = &mut self.made else {
+            return Err(GatewayRefusal::NotUp);
+        };
         let now = Instant::now();
         if !self.clients.contains_key(&client) && self.clients.len() >= CLIENTS {
             let oldest = self.clients.iter().min_by_key(|(_, (_, last))| *last);
@@ -96,12 +110,15 @@ impl ObjectThread {
             Ok(bodies) => messages(&bodies),
             Err(code) => error_reply(code),
         };
+        if self.commands.follow(dictionary, report) {
+            self.made = None;
+        }
         answered.map_err(|_| GatewayRefusal::TooLong)
     }
 
     /// The objects are made anew when they are old.
     fn refresh(&mut self) -> Result<(), GatewayRefusal> {
-        if self.dictionary.as_ref().is_some_and(|(_, made)| made.elapsed() < FRESH) {
+        if self.made.as_ref().is_some_and(|made| made.at.elapsed() < FRESH) {
             return Ok(());
         }
         let (reply, snapshot) = mpsc::sync_channel(1);
@@ -110,7 +127,9 @@ impl ObjectThread {
         let snapshot = snapshot.recv_timeout(PATIENCE).map_err(|_| GatewayRefusal::NoAnswer)?;
         let snapshot = snapshot.ok_or(GatewayRefusal::NotUp)?;
         let report = self.online.report(&snapshot).ok_or(GatewayRefusal::NotUp)?;
-        self.dictionary = Some((dictionary(&report), Instant::now()));
+        let counted = self.commands.counted_from_base(report.clone());
+        let dictionary = dictionary(&counted, &self.commands);
+        self.made = Some(MadeObjects { dictionary, report, at: Instant::now() });
         Ok(())
     }
 }

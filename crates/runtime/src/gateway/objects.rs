@@ -1,6 +1,6 @@
 //! The objects of the MainDevice itself: what is planned, found and counted, at address 0.
 //!
-//! Reference: ETG.1510. Nothing can be written there. SubDevice n of the plan, from 0, has the objects 0x8000 + n
+//! Reference: ETG.1510. Of these nothing can be written (`commands` has those that can). SubDevice n of the plan, from 0, has the objects 0x8000 + n
 //! (configuration), 0x9000 + n (what was found; only while it is there) and 0xA000 + n (state and counters). Only what
 //! this program knows has an entry; entries in between that it does not know are left out.
 
@@ -9,6 +9,7 @@ use linesman_proto::mailbox::coe::{DataType, ObjectIndex};
 use linesman_proto::state::AlState;
 use linesman_sim::device::dictionary::{Dictionary, Entry, Object, READ_ONLY};
 
+use super::commands::ObjectCommands;
 use crate::online::report::{Count, OnlineDevice, OnlineIdentity, OnlinePort, OnlineReport};
 
 /// SubDevices that have objects: there are 0x1000 indices of each kind.
@@ -23,10 +24,14 @@ const TYPE_LEN: usize = 16;
 const NAME_LEN: usize = 32;
 /// Device type of modular devices: their profile, ETG.5001.
 const MODULAR: u64 = 5001;
+/// Types of SyncManagers, as object 0x1C00 has them.
+const MAILBOX_OUT: u64 = 1;
+const MAILBOX_IN: u64 = 2;
 
-/// The dictionary of a network as it is now.
-pub(super) fn dictionary(report: &OnlineReport) -> Dictionary {
+/// The dictionary of a network as it is now, and of what clients have written.
+pub(super) fn dictionary(report: &OnlineReport, commands: &ObjectCommands) -> Dictionary {
     let mut objects = fixed();
+    objects.extend(commands.objects());
     let devices = report.devices.get(..MOST).unwrap_or(&report.devices);
     for (device, number) in devices.iter().zip(0..) {
         objects.push(configuration(0x8000 + number, device));
@@ -69,6 +74,14 @@ fn fixed() -> Vec<Object> {
                 udint(3, "Revision number", 0),
                 udint(4, "Serial number", 0),
             ],
+        ),
+        // It has a mailbox each way and no process data of its own.
+        Object::list(
+            ObjectIndex(0x1C00),
+            "Sync manager type",
+            ObjectCode::Array,
+            DataType::USINT,
+            vec![usint(1, "Mailbox out", MAILBOX_OUT), usint(2, "Mailbox in", MAILBOX_IN)],
         ),
     ]
 }
@@ -199,7 +212,7 @@ fn lists(index: u16, name: &str, stations: &[u16]) -> Vec<Object> {
 /// The type number of a record that no table describes: that of records of entries in general.
 const RECORD: DataType = DataType(0x0021);
 
-fn record(index: u16, name: &str, entries: Vec<Entry>) -> Object {
+pub(super) fn record(index: u16, name: &str, entries: Vec<Entry>) -> Object {
     Object::list(ObjectIndex(index), name, ObjectCode::Record, RECORD, entries)
 }
 
@@ -279,6 +292,10 @@ mod tests {
         }
     }
 
+    fn dictionary(report: &OnlineReport) -> Dictionary {
+        super::dictionary(report, &ObjectCommands::default())
+    }
+
     fn number(dictionary: &Dictionary, index: u16, subindex: u8) -> u64 {
         let data = dictionary.upload(ObjectAddress::new(index, subindex), AlState::Op);
         data.unwrap().iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
@@ -302,6 +319,7 @@ mod tests {
         assert_eq!((number(0xF040, 0), number(0xF040, 1)), (1, 0x1001));
         assert_eq!((number(0xF120, 1), number(0xF120, 2)), (5, 0xFFFF_FFFF));
         assert_eq!((number(0xF120, 3), number(0xF120, 16)), (1_000, 0x0123));
+        assert_eq!([0, 1, 2].map(|at| number(0x1C00, at)), [2, 1, 2]);
     }
 
     // The structures ST_EcSlaveConfigData and ST_EcSlaveScannedData of PLC libraries: 80 and 22 bytes, the first with
@@ -325,17 +343,17 @@ mod tests {
     #[test]
     fn long_lines_have_several_lists_and_nothing_overflows() {
         let devices: Vec<_> = (1..=600).map(|no| device(no, true)).collect();
-        let dictionary = dictionary(&report(devices));
+        let long = dictionary(&report(devices));
         for (index, count) in [(0xF020, 255), (0xF021, 255), (0xF022, 90)] {
-            assert_eq!(number(&dictionary, index, 0), count);
+            assert_eq!(number(&long, index, 0), count);
         }
-        assert_eq!(number(&dictionary, 0xF022, 90), 0x1000 + 600);
-        assert!(dictionary.object(ObjectIndex(0xF023)).is_none());
+        assert_eq!(number(&long, 0xF022, 90), 0x1000 + 600);
+        assert!(long.object(ObjectIndex(0xF023)).is_none());
         // Of what has no index of its own there is no object.
-        let most = super::dictionary(&report(vec![OnlineDevice::default(); MOST + 10]));
+        let most = dictionary(&report(vec![OnlineDevice::default(); MOST + 10]));
         assert!(most.list(ListKind::All).all(|index| index.0 < 0x9000 || index.0 >= 0xA000));
         assert_eq!(number(&most, 0xF02F, 0), 255);
-        let none = super::dictionary(&report(Vec::new()));
+        let none = dictionary(&report(Vec::new()));
         assert_eq!(number(&none, 0xF020, 0), 0);
     }
 }

@@ -108,7 +108,8 @@ impl GatewayServer {
     }
 
     pub(super) fn report(&self) -> GatewayReport {
-        self.counts.report(self.listen, self.options.read_only)
+        let report = self.counts.report(self.listen, self.options.read_only);
+        GatewayReport { clients: self.clients.count(), ..report }
     }
 
     /// Time since the gateway was opened.
@@ -138,9 +139,10 @@ impl GatewayServer {
         let message = gateway::parse(frame).map_err(|_| GatewayRefusal::Malformed)?;
         let Message { header, data } = message;
         let station = header.address.value();
-        // The objects of the MainDevice cannot be written in any case.
-        let read_only = self.options.read_only && station != 0;
-        let refusal = match screen(header.kind, data, read_only) {
+        if station == 0 && header.kind != MailboxType::Coe {
+            return Err(GatewayRefusal::Protocol);
+        }
+        let refusal = match screen(header.kind, data, self.options.read_only) {
             Ok(()) => None,
             Err(out) if out.answer.is_empty() => return Err(out.why),
             Err(out) => {
@@ -153,8 +155,9 @@ impl GatewayServer {
         let unanswered = GatewayWaiting { client: client.id, header, sender, answers, place };
         let (kind, data) = (header.kind, data.to_vec());
         let asked = if station == 0 {
-            if kind != MailboxType::Coe {
-                return Err(GatewayRefusal::Protocol);
+            if let Some(refusal) = refusal {
+                unanswered.give(Ok(refusal));
+                return Ok(());
             }
             objects.try_send(ObjectRequest { data, unanswered }).map_err(drop)
         } else {

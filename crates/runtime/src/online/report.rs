@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ethernet::EthernetReport;
+use crate::gateway::GatewayReport;
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "linesman.online/1";
@@ -59,6 +60,9 @@ pub struct OnlineReport {
     /// What goes through the virtual switch (EoE); `null`: no SubDevice has a port of it, and there is no interface.
     #[serde(default)]
     pub ethernet: Option<EthernetReport>,
+    /// What goes through the mailbox gateway; `null`: none is open.
+    #[serde(default)]
+    pub gateway: Option<GatewayReport>,
 }
 
 /// A hot connect group.

@@ -13,6 +13,7 @@ use super::build;
 use super::report::{Card, OnlineReport};
 use super::snapshot::Snapshot;
 use crate::ethernet::EthernetWatch;
+use crate::gateway::GatewayWatch;
 
 /// So long after the last frame that a card did not take it counts as taking them again.
 const FORGIVEN_AFTER: Span = Span::s(1);
@@ -34,6 +35,8 @@ struct OnlineShared {
     base: Statistics,
     /// Counts of the virtual switch beside the run.
     ethernet: Option<EthernetWatch>,
+    /// Counts of the mailbox gateway beside the run.
+    gateway: Option<GatewayWatch>,
 }
 
 impl OnlineState {
@@ -57,6 +60,11 @@ impl OnlineState {
     /// A virtual switch passes frames of SubDevices on.
     pub fn set_ethernet(&self, watch: EthernetWatch) {
         self.lock().ethernet = Some(watch);
+    }
+
+    /// A mailbox gateway is open.
+    pub(crate) fn set_gateway(&self, watch: GatewayWatch) {
+        self.lock().gateway = Some(watch);
     }
 
     /// Something happened; gives the entries of the log that it leads to.
@@ -138,6 +146,7 @@ impl OnlineState {
         report.cards.clone_from(&inner.cards);
         let ethernet = inner.ethernet.as_ref().map(EthernetWatch::report);
         report.ethernet = ethernet.filter(|one| !one.is_idle());
+        report.gateway = inner.gateway.as_ref().map(GatewayWatch::report);
         Some(report)
     }
 

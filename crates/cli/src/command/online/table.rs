@@ -5,7 +5,7 @@ use linesman_runtime::online::report::{
     Count, FrameCounts, OnlineDevice, OnlineGroup, OnlinePort, OnlineReport,
 };
 
-use crate::command::run::ethernet::summary;
+use crate::command::run::{ethernet, gateway};
 use crate::output::{Output, Paint, Table};
 use crate::text::quantity::{count, grouped, time};
 
@@ -28,8 +28,11 @@ pub(super) fn text(report: &OnlineReport, last: Option<&OnlineReport>, output: &
     text.push('\n');
     text.push_str(&groups(report));
     text.push_str(&frames(report));
-    if let Some(ethernet) = &report.ethernet {
-        text.push_str(&summary(ethernet));
+    if let Some(frames) = &report.ethernet {
+        text.push_str(&ethernet::summary(frames));
+    }
+    if let Some(messages) = &report.gateway {
+        text.push_str(&gateway::summary(messages));
     }
     text.push_str(&log(report));
     text

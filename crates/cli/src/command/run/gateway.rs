@@ -98,9 +98,10 @@ pub(super) fn opened(gateway: &MailboxGateway) -> String {
 }
 
 /// What went through it, for people.
-pub(super) fn summary(report: &GatewayReport) -> String {
+pub(in crate::command) fn summary(report: &GatewayReport) -> String {
     let (requests, answers) = (count(report.requests, "request"), count(report.answers, "answer"));
-    let mut text = format!("Mailbox gateway: {requests}, {answers}");
+    let clients = count(report.clients, "client");
+    let mut text = format!("Mailbox gateway: {requests} of {clients}, {answers}");
     let refused: u64 = report.refused.values().sum();
     if refused > 0 {
         let reasons = report.refused.iter().map(|(reason, count)| format!("{reason} {count}"));
