@@ -14,6 +14,7 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("ip", "-V", "iproute2"),
     ("ethtool", "--version", "ethtool"),
     ("jq", "--version", "jq"),
+    ("nft", "--version", "nftables"),
     ("python3", "--version", "python3"),
 ];
 
@@ -76,7 +77,12 @@ fn install(context: &Context<'_>, packages: &[&str]) {
     if !apt("apt-install", &arguments) {
         // The lists may be old or absent.
         apt("apt-update", &["update"]);
-        apt("apt-install", &arguments);
+        if !apt("apt-install", &arguments) {
+            // One that the archive does not have must not keep the others away.
+            for package in packages {
+                apt("apt-install", &["install", "--yes", "--no-install-recommends", package]);
+            }
+        }
     }
 }
 
