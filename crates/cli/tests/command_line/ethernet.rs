@@ -214,7 +214,10 @@ print("firewall" in checks)' $2 $3 $4 $5 $6
         "True",
     ];
     match run.stdout.contains("no nft") {
-        true => expected.extend(["no nft"]),
+        true => {
+            eprintln!("SKIPPED: nft cannot be asked here, so no rule of a firewall is tried");
+            expected.push("no nft");
+        }
         false => expected.extend([
             "firewall doubtful sudo nft list ruleset",
             "True",
