@@ -88,10 +88,11 @@ impl Library {
         best.map(|one| one.type_name.as_str())
     }
 
-    /// The PDOs that a product assigns by default, by its description: of its revision, else of a near one.
+    /// The PDOs that a product assigns by default, by its description: of its revision, else of a near one. None where no
+    /// description fits.
     ///
     /// # Errors
-    /// Why the description cannot be used, in words; also where there is none.
+    /// Why the description cannot be used, in words.
     pub fn pdos_of(
         &mut self,
         vendor_id: u32,
