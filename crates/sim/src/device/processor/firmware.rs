@@ -35,12 +35,15 @@ impl Firmware for Processor {
     }
 
     fn run(&mut self, now: Instant, pdi: &mut Pdi<'_>) -> Option<Instant> {
-        if pdi.take_activation_event() {
-            self.check_again(pdi);
-        }
         self.mind_locks(pdi);
         self.serve_process_data(now, pdi);
         self.serve_requests(now, pdi);
+        // Behind requests, and not while one is worked on, as the main loop of the ETG's Slave Stack Code does: whoever
+        // orders INIT takes the mailbox away at once.
+        let works = self.step.is_some_and(|step| step.due > now);
+        if !works && pdi.take_activation_event() {
+            self.check_again(pdi);
+        }
         let state = ApplicationLayer::state(pdi);
         let again = if state.has_mailbox() && self.description.mailbox.is_present() {
             self.tell_emergencies(pdi);

@@ -159,6 +159,18 @@ fn a_switched_off_sync_manager_takes_the_state_away() {
 }
 
 #[test]
+fn mailbox_that_is_taken_away_while_init_is_ordered_is_no_error() {
+    let mut device = Device::of("EL7041");
+    device.enter_preop();
+    // As ethercrab resets a line: the order, and in the next frames all SyncManagers.
+    device.bench.write(0x0120, &[0x11, 0]);
+    device.bench.write(0x0800, &[0; 16]);
+    device.bench.wait(Span::ms(20));
+    assert_eq!(device.status(), (1, 0));
+    assert_eq!(device.request(2), (0x11, 0x0016), "without a mailbox it goes no further");
+}
+
+#[test]
 fn boot_has_a_mailbox_of_its_own() {
     let mut device = Device::of("EL3104");
     device.guard(0, 0x1000, 244, SmControl::MAILBOX_OUT);
