@@ -56,7 +56,7 @@ pub struct DatagramAccess<'a> {
     pub read: Option<&'a [u8]>,
     /// What SubDevices have added to its working counter; `None` where it did not come back.
     pub wkc: Option<u16>,
-    /// What SubDevices have added to the working counter of this copy alone.
+    /// The part of the working counter that SubDevices have added to this copy alone.
     pub own: u16,
     /// The card of a ring by which this copy had gone out; `None` where that is not known.
     pub sent_by: Option<Path>,

@@ -57,7 +57,7 @@ pub(super) fn run(context: &Context<'_>) -> Result<Outcome> {
     Ok(Outcome::Passed { count: passed, note })
 }
 
-/// What failed, with the last line of its reason, which is the error of a program that a check ran.
+/// The checks that failed, each with the last line of its reason, which is the error of a program that a check ran.
 fn failures(output: &str) -> String {
     let mut told = String::new();
     let mut last: Option<&str> = None;

@@ -266,7 +266,7 @@ fn reads(bench: &mut Bench, object: ObjectAddress, complete: bool, data: &[u8]) 
     bench.answers(Response::Upload { object, complete, initial });
 }
 
-/// What the objects that the bench has seen say of SyncManager 3: PDO, and index, subindex and bits of its entries.
+/// PDOs of SyncManager 3 as the objects say that the bench has seen: PDO, and index, subindex and bits of its entries.
 fn assigned(bench: &Bench) -> Option<Vec<(u16, String, Vec<MappedPart>)>> {
     let mut objects = PdoObjects::default();
     let transfers = bench.dialogue.store.transfers.iter();

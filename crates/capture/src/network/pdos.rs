@@ -56,7 +56,7 @@ pub(super) struct MappedStretch {
     pub(super) at: u32,
 }
 
-/// What is known of the PDOs of a SubDevice.
+/// The PDOs of a SubDevice, as each source tells them.
 pub(super) struct DevicePdos<'a> {
     objects: PdoObjects,
     sii: Vec<MappedPdo>,

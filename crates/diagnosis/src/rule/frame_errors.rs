@@ -76,7 +76,7 @@ pub const LAST_HOP: RulePage = RulePage {
 /// Errors that did not come again for this long are over.
 const QUIET: Span = Span::s(2);
 
-/// So many damaged frames at the card may be what a link cut off when it opened and when it was back.
+/// Damaged frames at the card that a link may have cut off when it opened and when it was back.
 const CUT_OFF: u64 = 4;
 
 /// The rule.

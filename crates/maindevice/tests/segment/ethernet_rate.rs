@@ -47,7 +47,7 @@ fn filler(len: usize) -> FramePlan {
     }])
 }
 
-/// What a device sends or takes in a second, and what was estimated, both in bytes of data; `fillers` are the lengths of further
+/// Bytes of data that a device sends or takes in a second, and the estimate; `fillers` are the lengths of further
 /// cyclic frames.
 fn carried(name: &str, from: bool, us: u64, fillers: &[usize]) -> (f64, EthernetRate) {
     let mut bench = Bench::new(&plant(from.then_some(name)));

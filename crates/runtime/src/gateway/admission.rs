@@ -112,7 +112,7 @@ impl GatewayClients {
         Arc::new(GatewayClient { id, waiting: AtomicUsize::default() })
     }
 
-    /// How many there were so far.
+    /// Number of clients so far.
     pub(super) fn count(&self) -> u64 {
         self.next.load(Ordering::Relaxed).saturating_sub(1)
     }

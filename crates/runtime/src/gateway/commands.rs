@@ -23,7 +23,7 @@ const RESPONSE_LEN: usize = 6;
 /// Status of a command: done without an error, and there is a response.
 const DONE: u8 = 1;
 
-/// What clients have written, and what came of it. It is the same for all clients, as in any object dictionary.
+/// Objects that clients have written, with the result. It is the same for all clients, as in any object dictionary.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct ObjectCommands {
     /// The last command; none was given before the first.

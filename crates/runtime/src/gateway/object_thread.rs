@@ -37,7 +37,7 @@ struct ObjectThread {
     online: OnlineState,
     /// The objects, of which report they were made, and when.
     made: Option<MadeObjects>,
-    /// What clients have written into them.
+    /// Commands that clients have written into them.
     commands: ObjectCommands,
     /// The transfer of each client, and when it asked last.
     clients: BTreeMap<u64, (ObjectServer, Instant)>,

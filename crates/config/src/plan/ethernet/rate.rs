@@ -24,7 +24,7 @@ const FRAME: usize = 1_514;
 const DATA: u64 = 1_460;
 /// The cycle of a line without cyclic frames: the mailbox is looked into so often.
 const WITHOUT_CYCLE: Span = Span::ms(1);
-/// What a SubDevice is taken to need for a message. No plan tells: it is what those of a virtual segment need.
+/// Time that a SubDevice is taken to need for a message. No plan tells: it is what those of a virtual segment need.
 const MESSAGE_TIME: Span = Span::us(600);
 /// The first wait while a mailbox is full, and the longest: each is twice as long as the one before.
 const FULL_WAITS: [Span; 2] = [Span::us(500), Span::ms(10)];
@@ -33,7 +33,7 @@ const FULL_WAITS: [Span; 2] = [Span::us(500), Span::ms(10)];
 const SETTLING: u64 = 500;
 /// Cycles in which they are counted.
 const COUNTED: u64 = 1_500;
-/// What one cause takes away at least before it counts as the limit, in percent.
+/// Share of the rate that one cause takes away at least before it counts as the limit, in percent.
 const NOTABLE_PERCENT: u64 = 5;
 
 /// What limits the throughput.
@@ -183,7 +183,7 @@ impl PlayedWire {
         self.count += u64::from(at >= self.begin);
     }
 
-    /// How many messages come of a SubDevice that always has one.
+    /// Messages that come of a SubDevice that always has one.
     fn messages_from(&mut self, mailbox: usize, is_mapped: bool) -> u64 {
         let mut now = 0;
         loop {
@@ -198,7 +198,7 @@ impl PlayedWire {
         }
     }
 
-    /// How many messages go to a SubDevice that takes so long for each; the next one waits in its mailbox meanwhile.
+    /// Messages that go to a SubDevice that takes so long for each; the next one waits in its mailbox meanwhile.
     fn messages_to(&mut self, mailbox: usize, fragments: usize, message_time: Span) -> u64 {
         let (mut now, mut sent) = (0, 0_u64);
         // When the message that is worked on is done, and the one that waits behind it.

@@ -17,7 +17,7 @@ const IN_FLIGHT: Span = Span::ms(10);
 /// or two.
 const BESIDE_CHANGES: usize = 4;
 
-/// So many frames that are lost in a row were not hit one by one.
+/// Frames in a row that are too many to have been hit one by one.
 const IN_A_ROW: u64 = 8;
 
 impl ErrorWalk<'_, '_> {

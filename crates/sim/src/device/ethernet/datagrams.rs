@@ -20,7 +20,7 @@ pub struct UdpDatagrams {
     pub from: [u8; 4],
     /// Bytes in each, at most [`LONGEST_DATAGRAM`].
     pub bytes: u16,
-    /// So many at once; at least one.
+    /// Datagrams at once; at least one.
     pub burst: u16,
     /// From one burst to the next.
     pub every: Span,
@@ -32,7 +32,7 @@ pub(super) struct DatagramSource {
     what: UdpDatagrams,
     count: u16,
     due: Option<Instant>,
-    /// What is left of the burst.
+    /// Datagrams that are left of the burst.
     left: u16,
 }
 
