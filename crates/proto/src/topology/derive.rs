@@ -246,7 +246,7 @@ impl Forest {
             return (first, None, EntryBasis::OnlyPort);
         };
         match entry_by_time(seen) {
-            Timed::Entry(entry, times) => return (entry, Some(times), EntryBasis::ReceiveTimes),
+            Timed::Entry(entry, times) => return (entry, times, EntryBasis::ReceiveTimes),
             Timed::Disordered => self.doubts.push(Doubt::ReceiveTimes { node }),
             Timed::Unknown => {}
         }
@@ -385,32 +385,32 @@ struct Found {
 
 /// What receive times say about the entry.
 enum Timed {
-    Entry(Port, PortMap<DcTime32>),
+    Entry(Port, Option<PortMap<DcTime32>>),
     Disordered,
     Unknown,
 }
 
-/// The open port with the earliest receive time, if all open ports have one and the times grow in
-/// frame order from there, as those of one frame must.
+/// The open port with the earliest receive time, and all times if all open ports have one. Those that are known must grow
+/// in frame order, as those of one frame do; a port without time is one that the frame did not come back to.
 fn entry_by_time(seen: &SeenController) -> Timed {
-    let mut times = PortMap::default();
-    let mut earliest: Option<Port> = None;
-    for port in Port::ALL.into_iter().filter(|&port| seen.open[port]) {
-        let Some(time) = seen.received[port] else { return Timed::Unknown };
-        times[port] = time;
-        if earliest.is_none_or(|earliest| time.delta(times[earliest]) < 0) {
-            earliest = Some(port);
+    let known = |port: &Port| seen.open[*port].then_some(seen.received[*port]).flatten();
+    let mut earliest: Option<(Port, DcTime32)> = None;
+    for port in Port::ALL {
+        let Some(time) = known(&port) else { continue };
+        if earliest.is_none_or(|(_, earliest)| time.delta(earliest) < 0) {
+            earliest = Some((port, time));
         }
     }
-    let Some(entry) = earliest else { return Timed::Unknown };
-    let mut before = entry;
-    for port in ports_after(entry).into_iter().filter(|&port| seen.open[port]) {
-        if times[port].delta(times[before]) <= 0 {
+    let Some((entry, mut before)) = earliest else { return Timed::Unknown };
+    for time in ports_after(entry).iter().filter_map(known) {
+        if time.delta(before) <= 0 {
             return Timed::Disordered;
         }
-        before = port;
+        before = time;
     }
-    Timed::Entry(entry, times)
+    let is_whole = Port::ALL.iter().all(|port| !seen.open[*port] || known(port).is_some());
+    let times = PortMap::from_fn(|port| known(&port).unwrap_or_default());
+    Timed::Entry(entry, is_whole.then_some(times))
 }
 
 /// The entry port with which a controller takes as many earlier trees as it can, at most `trees`
