@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use linesman_config::fault::FaultName;
+use linesman_config::plan::ClockSettings;
 use linesman_config::project::Project;
 use linesman_diagnosis::model::reported::PartExchange;
 use linesman_diagnosis::observe::{Direction, FrameSeen};
@@ -570,6 +571,12 @@ impl<'a> Play<'a> {
         })
     }
 
+    /// True if a SubDevice is planned to work in step with a SYNC signal; with a hot connect group none is.
+    fn keeps_step(&self) -> bool {
+        let devices = self.lab.plan().into_iter().flat_map(|plan| &plan.devices);
+        devices.filter_map(|device| device.settings.clock.as_ref()).any(ClockSettings::sync0)
+    }
+
     pub(super) fn outcome(
         &self,
         active: &Active,
@@ -626,7 +633,7 @@ impl<'a> Play<'a> {
             live,
             capture,
             baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
-            is_bearable: is_bearable(record, entry, self.case.clocks.then_some(self.case.cycle)),
+            is_bearable: is_bearable(record, entry, self.keeps_step().then_some(self.case.cycle)),
             is_unseen: truth.unseen.is_some(),
             is_pause,
             listened,
