@@ -147,6 +147,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         let together: Vec<_> = falls
             .iter()
             .filter(|other| other.is_restart && other.overlaps(fall))
+            .filter(|other| !supply::are_apart(model, &falls, [fall, other]))
             .copied()
             .collect();
         conditions.push(if fall.is_restart {
