@@ -50,6 +50,6 @@ fn length_behind(model: &NetworkModel, tree: &Tree, link: usize) -> Option<Span>
     let ports: Vec<_> = tree.open_ports(near).collect();
     let at = ports.iter().position(|one| *one == port)?;
     let before = ports.get(at.checked_sub(1)?)?;
-    let away = times[port].0.wrapping_sub(times[*before].0);
+    let away = times[port]?.0.wrapping_sub(times[*before]?.0);
     (away > 0).then(|| Span::ns(away.into()))
 }

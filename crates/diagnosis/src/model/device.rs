@@ -84,8 +84,10 @@ pub struct Device {
     /// Its process data watchdog, as last read or written.
     pub watchdog: Watchdog,
     /// When a frame was received at each port, by its own clock: registers 0x0900 to 0x090F as last
-    /// read. Those of closed ports mean nothing.
-    pub received: Option<PortMap<DcTime32>>,
+    /// read. Those of closed ports mean nothing; `None` for one that the frame did not meet.
+    pub received: Option<PortMap<Option<DcTime32>>>,
+    /// The same registers with what ports have left over that the frame did not meet.
+    pub latched: Option<PortMap<DcTime32>>,
     /// Time since it came up, as last read.
     pub up_time: Option<UpTime>,
     /// Whether its SYNC signals are switched on: register 0x0981 as last written.
@@ -290,6 +292,7 @@ impl Device {
             mailbox: MailboxHistory::default(),
             watchdog: Watchdog::default(),
             received: None,
+            latched: None,
             up_time: None,
             sync_on: None,
             clock: ClockHistory::default(),
@@ -307,7 +310,7 @@ impl Device {
         let first = self.dl.first.map(|first| first.value).unwrap_or_default();
         SeenController {
             open: PortMap::from_fn(|port| first.port_state(port).is_active()),
-            received: PortMap::from_fn(|port| self.received.map(|times| times[port])),
+            received: self.received.unwrap_or_default(),
         }
     }
 

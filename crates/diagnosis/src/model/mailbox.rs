@@ -24,6 +24,10 @@ pub struct MailboxHistory {
     pub reads_whole: bool,
     /// When somebody last looked for an answer.
     pub polled: Option<Instant>,
+    /// When it was last seen without a message since the request that waits was taken.
+    pub seen_empty: Option<Instant>,
+    /// When it was first seen with a message that nobody has fetched yet, since that request was taken.
+    pub seen_full: Option<Instant>,
     /// Since when, and until when, requests are not taken; `None` when the latest one was.
     pub full: Option<(Seen<()>, Instant)>,
     /// Since when, and until when, the mailbox for requests was read full (SyncManager 0, 0x0805): nobody fetches what is
@@ -70,6 +74,9 @@ pub struct SlowAnswer {
     pub object: Option<ObjectAddress>,
     /// When it was asked.
     pub asked: Instant,
+    /// How long the SubDevice took at least: until its answer was seen in the mailbox, or the mailbox was last seen without it. An
+    /// answer that lies there until somebody has the time to fetch it is not late.
+    pub took: Span,
     /// Not an answer came late: a fragment of an Ethernet frame was taken late, which nothing answers.
     pub carries_frame: bool,
 }
@@ -104,6 +111,7 @@ impl MailboxHistory {
             self.note_stuck(since.at, until.max(at));
         }
         self.fetched();
+        (self.seen_empty, self.seen_full) = (None, None);
         if let Some(waiting) = self.waiting.replace(Seen::new(object, at, Some(frame))) {
             self.note_stuck(waiting.at, at);
         }
@@ -120,7 +128,7 @@ impl MailboxHistory {
         if took < NOTABLE || took >= STUCK {
             return took >= STUCK;
         }
-        let slow = SlowAnswer { object: None, asked: since.at, carries_frame: true };
+        let slow = SlowAnswer { object: None, asked: since.at, took, carries_frame: true };
         push_kept(&mut self.slow, Seen::new(slow, at, Some(frame)));
         true
     }
@@ -142,6 +150,24 @@ impl MailboxHistory {
         let since = self.unfetched.map_or(Seen::new((), at, Some(frame)), |(since, _)| since);
         self.unfetched = Some((since, at));
         at.since(since.at) >= STUCK
+    }
+
+    /// Somebody looked whether a message lies in the mailbox of answers, or process data tell of it.
+    pub fn looked(&mut self, is_full: bool, at: Instant) {
+        if is_full {
+            self.seen_full.get_or_insert(at);
+        } else {
+            (self.seen_empty, self.seen_full) = (Some(at), None);
+        }
+    }
+
+    /// A message was fetched. Says whether a request still waits: then it was about something else.
+    pub fn fetched_other(&mut self, at: Instant) -> bool {
+        let is_other = self.waiting.is_some();
+        if is_other {
+            self.looked(false, at);
+        }
+        is_other
     }
 
     fn fetched(&mut self) {
@@ -190,10 +216,14 @@ impl MailboxHistory {
     /// The request that waits is answered. Says whether it took long enough to be worth a word.
     fn answered_by(&mut self, at: Instant, frame: u64) -> bool {
         let Some(waiting) = self.waiting.take() else { return false };
-        if at.since(waiting.at) < NOTABLE {
+        let (empty, full) = (self.seen_empty.take(), self.seen_full.take());
+        // Where nobody looked before it was fetched, and no bit tells of it, it may have come just then.
+        let took = full.or(empty).unwrap_or(at).since(waiting.at);
+        if took < NOTABLE {
             return false;
         }
-        let slow = SlowAnswer { object: waiting.value, asked: waiting.at, carries_frame: false };
+        let (object, asked) = (waiting.value, waiting.at);
+        let slow = SlowAnswer { object, asked, took, carries_frame: false };
         push_kept(&mut self.slow, Seen::new(slow, at, Some(frame)));
         true
     }
@@ -260,6 +290,22 @@ mod tests {
         mailbox.error_reply(SERVICE, at(5), 6);
         assert_eq!(refused(&mailbox).1, [MailboxRefusal::Error(SERVICE)]);
         assert!(!mailbox.is_open());
+    }
+
+    #[test]
+    fn answer_that_lies_in_the_mailbox_until_somebody_fetches_it_is_not_late() {
+        let took = |looks: &[(bool, u64)]| {
+            let mut mailbox = MailboxHistory::default();
+            mailbox.asked(None, false, at(0), 1);
+            looks.iter().for_each(|(is_full, ms)| mailbox.looked(*is_full, at(*ms)));
+            mailbox.answered(at(400), 2);
+            mailbox.slow.back().map(|seen| seen.value.took.as_nanos() / 1_000_000)
+        };
+        assert_eq!(took(&[]), Some(400), "nobody has looked before");
+        assert_eq!(took(&[(false, 20), (true, 30), (true, 390)]), None);
+        assert_eq!(took(&[(false, 20)]), None, "it may have come at 21 ms");
+        assert_eq!(took(&[(false, 20), (false, 390)]), Some(390));
+        assert_eq!(took(&[(false, 90), (true, 120)]), Some(120));
     }
 
     #[test]

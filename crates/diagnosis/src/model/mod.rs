@@ -52,6 +52,7 @@ pub use device::{Absence, Chip, Device, Planned, SeenIdentity, SharedAddress, Sh
 pub use dl_history::{DlChange, DlHistory};
 pub use event_field::{EventField, EventTrack};
 pub use host::{CardHistory, HostHistory, Tally};
+use learn::AwaitedBit;
 pub use learn::Learner;
 pub use path_delay::{PathDelayStep, PathDelays};
 pub use probe_record::ProbeRecord;
@@ -145,6 +146,8 @@ pub struct NetworkModel {
     /// Station addresses that were asked without any answer, and that no SubDevice was seen to have: in the order of
     /// the first request, some dozens at most.
     pub asked_in_vain: Vec<StationAddress>,
+    /// Bits of process data that will tell of answers in mailboxes: of requests that wait.
+    awaited_bits: Vec<AwaitedBit>,
     /// Record of a capture probe on links.
     pub capture_probe: ProbeRecord,
     /// What another program says of the line.
@@ -161,8 +164,12 @@ pub struct NetworkModel {
     /// When DL control was last written to stay, as a MainDevice does to measure delays on an opened ring: frames that
     /// were on their way then are lost by order.
     pub loops_ordered: Option<Instant>,
+    /// The first of those writes that followed each other.
+    loops_first_ordered: Option<Instant>,
     /// DL control as it was written for temporary use, in the order of time.
     pub loop_writes: VecDeque<LoopWrite>,
+    /// Whether the frame that latched receive times last went round a closed ring, in both directions.
+    pub latched_in_ring: bool,
     revision: u64,
     /// From how many controllers and receive times the tree was derived.
     tree_basis: (usize, usize),
@@ -179,6 +186,13 @@ impl NetworkModel {
     pub fn note_loops(&mut self, write: LoopWrite) {
         search::note(&mut self.loop_writes, write);
         self.touch();
+    }
+
+    /// The port of a controller that is closed by order at `at`, for temporary use.
+    #[must_use]
+    pub fn closed_by_order(&self, id: DeviceId, at: Instant) -> Option<Port> {
+        let write = self.loop_writes.iter().rev().find(|write| write.device == id)?;
+        write.closed.filter(|_| at.since(write.seen.at) < search::TOGETHER)
     }
 
     /// A network as it was planned: names, identities and wiring. A plan whose wiring contradicts
@@ -260,9 +274,21 @@ impl NetworkModel {
     /// Whether a request that was sent at `at` may be lost because the MainDevice opened or closed ports.
     #[must_use]
     pub fn is_lost_by_order(&self, at: Instant) -> bool {
-        self.loops_ordered.is_some_and(|ordered| {
-            ordered.before(ORDER_IN_FLIGHT) <= at && at.since(ordered) < ORDER_LASTS
+        // What was lost between closing and opening may be heard of when the port is open again.
+        let (first, last) = (self.loops_first_ordered, self.loops_ordered);
+        first.zip(last).is_some_and(|(first, last)| {
+            let begin = first.max(last.before(ORDER_LASTS)).before(ORDER_IN_FLIGHT);
+            begin <= at && at.since(last) < ORDER_LASTS
         })
+    }
+
+    /// Notes that DL control was written to stay.
+    pub fn note_order(&mut self, at: Instant) {
+        let goes_on = self.loops_ordered.is_some_and(|last| at.since(last) < ORDER_LASTS);
+        if !goes_on {
+            self.loops_first_ordered = Some(at);
+        }
+        self.loops_ordered = Some(self.loops_ordered.map_or(at, |last| last.max(at)));
     }
 
     /// A controller.

@@ -18,7 +18,7 @@ use super::{Device, HoleSearch, NetworkModel, Seen, Silence};
 /// Writes that are kept: a search among 200 SubDevices takes some 20, each sent anew a few times.
 const KEPT: usize = 128;
 /// Writes of one search follow each other within this time: a port that was closed opens by itself after it.
-const TOGETHER: Span = Span::s(1);
+pub(super) const TOGETHER: Span = Span::s(1);
 /// A port that is closed shows within this time whether that helps.
 const PATIENCE: Span = Span::ms(100);
 

@@ -3,8 +3,8 @@
 //! A SubDevice refuses requests to its mailbox, answers them late, or not at all.
 //!
 //! **How it is found.** Requests and answers are seen in the mailbox areas behind 0x1000. `S250`: an SDO is
-//! aborted, or the mailbox answers with an error of its own. `S251`: an answer came 300 ms or longer after
-//! its request, or a fragment of an Ethernet frame (EoE), which nothing answers, was not taken for so long; from 100 ms on it is
+//! aborted, or the mailbox answers with an error of its own. `S251`: an answer was not in the mailbox for 300 ms or longer after
+//! its request (one that lies there until the MainDevice fetches it is not late), or a fragment of an Ethernet frame (EoE), which nothing answers, was not taken for so long; from 100 ms on it is
 //! told and is no warning yet. `S252`: for nearly a second a request is not taken (working counter 0: the one before is
 //! still in the mailbox, or status 0x0805 reads full all the time), or it is taken and the MainDevice looks for the answer in vain, while the controller answers as always.
 //!
@@ -124,17 +124,17 @@ fn slow(model: &NetworkModel, device: &Device) -> Option<Condition> {
         .confidence(0.7)
         .or(FaultName::FirmwareFault, 0.2)
         .about([Symptom::Mailbox(device.id)]);
-    if all.iter().all(|seen| seen.at.since(seen.value.asked) < SLOW_ANSWER) {
+    if all.iter().all(|seen| seen.value.took < SLOW_ANSWER) {
         // Slower than most, and no MainDevice minds.
         condition.severity = Severity::Info;
     }
     for seen in all.iter().rev().take(SHOWN) {
-        let ms = seen.at.since(seen.value.asked).as_nanos() / 1_000_000;
+        let ms = seen.value.took.as_nanos() / 1_000_000;
         let what = seen.value.object.map_or_else(String::new, |object| format!(" to {object}"));
         let label = model.label(device.id);
         let text = match seen.value.carries_frame {
             true => format!("{label} takes no further Ethernet fragment for {ms} ms (EoE)"),
-            false => format!("{label} answers a request{what} after {ms} ms"),
+            false => format!("{label} has no answer to a request{what} for {ms} ms"),
         };
         condition = condition.shown_by(Evidence::frame(seen.at, seen.frame.unwrap_or(0), text));
     }

@@ -368,8 +368,10 @@ impl<'a> FoundWiring<'a> {
             (Some(EntryBasis::ReceiveTimes), Some(times)) => {
                 let entry = self.tree.entry(found);
                 let open = self.tree.open_ports(found).filter(|port| *port != entry);
+                let later = |port: Port| Some((port, times[port]?.delta(times[entry]?)));
                 let later: Vec<String> = open
-                    .map(|port| format!("{port} {} ns later", times[port].delta(times[entry])))
+                    .filter_map(later)
+                    .map(|(port, ns)| format!("{port} {ns} ns later"))
                     .collect();
                 format!("; receive times: {entry} first, {}", later.join(", "))
             }

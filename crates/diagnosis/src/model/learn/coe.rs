@@ -8,7 +8,7 @@ use linesman_proto::mailbox::coe::{Emergency, Message, ObjectAddress, ObjectInde
 use linesman_proto::mailbox::error_reply::ErrorReply;
 use linesman_proto::mailbox::{Header, MailboxType, eoe};
 
-use super::Answer;
+use super::{Answer, mailbox_state};
 use crate::model::mailbox::{HistoryMessage, MailboxRefusal};
 use crate::model::{Device, NetworkModel, Seen};
 
@@ -83,6 +83,10 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
         | MailboxType::Voe
         | MailboxType::Reserved(_) => false,
     };
+    let device = model.devices.get_mut(id.index());
+    if device.is_some_and(|device| device.mailbox.fetched_other(at)) {
+        mailbox_state::expect(model, id);
+    }
     if news {
         model.touch();
     }
@@ -108,6 +112,7 @@ pub(super) fn written(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_
     let Some(device) = model.devices.get_mut(id.index()) else { return };
     if taken {
         device.mailbox.asked(object, reads_whole, answer.at, answer.frame);
+        mailbox_state::expect(model, id);
     } else {
         device.mailbox.not_taken(answer.at, answer.frame);
     }

@@ -9,6 +9,7 @@ mod answer;
 mod clock;
 mod coe;
 mod count;
+mod mailbox_state;
 mod process_data;
 mod registers;
 mod sii;
@@ -21,6 +22,7 @@ pub use address::Addresses;
 pub(crate) use answer::is_register_everywhere;
 pub use answer::{Answer, answers};
 use count::CountDoubt;
+pub(super) use mailbox_state::AwaitedBit;
 
 use super::{Cyclic, Device, NetworkModel, Seen, SharedBy};
 use crate::observe::{Exchange, FrameCopy};
@@ -274,6 +276,7 @@ impl Learner {
         }
         if answer.ado >= FIRST_RAM && answer.effect.reads {
             device.mailbox.polled = Some(answer.at);
+            device.mailbox.looked(false, answer.at);
             return;
         }
         if answer.is_last && registers::untaken(device, answer) {
@@ -397,7 +400,7 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
             if let Some(write) = write {
                 model.note_loops(write);
             } else if registers::is_dl_control(datagram.ado(), datagram.data()) {
-                model.loops_ordered = Some(request.time);
+                model.note_order(request.time);
             }
         }
         if datagram.command().is_some_and(|command| command.effect().writes) {

@@ -3,7 +3,7 @@
 use linesman_proto::address::LogicalAddress;
 use linesman_proto::time::Span;
 
-use super::Answer;
+use super::{Answer, mailbox_state};
 use crate::model::{Cyclic, Device, NetworkModel, Ordered, Owner, Seen, owners};
 
 /// A working counter that falls so soon after the first frame may have been ordered to before.
@@ -32,6 +32,7 @@ fn known_datagram(cyclic: &[Cyclic], latest: usize, answer: &Answer<'_>) -> Opti
 
 /// A datagram to whoever has an FMMU there. Says whether an answer was expected.
 pub(super) fn returned(model: &mut NetworkModel, latest: &mut usize, answer: &Answer<'_>) -> bool {
+    mailbox_state::look(model, answer);
     if !answer.is_last {
         return true;
     }

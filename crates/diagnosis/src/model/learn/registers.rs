@@ -31,7 +31,7 @@ const CLOCK_SETTING: std::ops::Range<u16> = 0x0920..0x0936;
 const SYNC_ACTIVATION: u16 = 0x0981;
 /// Status of SyncManager 0, which holds requests to the mailbox, and of SyncManager 1, which holds its answers.
 const MAILBOX_OUT_STATUS: u16 = 0x0805;
-const MAILBOX_IN_STATUS: u16 = 0x080D;
+pub(super) const MAILBOX_IN_STATUS: u16 = 0x080D;
 const WATCHDOG_DIVIDER: u16 = 0x0400;
 const WATCHDOG_TIME: u16 = 0x0420;
 
@@ -82,14 +82,14 @@ pub(super) fn read(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_>) 
             let is_full = SmStatus(status[0]).mailbox_full();
             news |= device.mailbox.read_status(is_full, at, answer.frame);
         }
-        if part(data, start, MAILBOX_IN_STATUS, 1).is_some() {
+        if let Some(status) = part(data, start, MAILBOX_IN_STATUS, 1) {
             device.mailbox.polled = Some(at);
+            device.mailbox.looked(SmStatus(status[0]).mailbox_full(), at);
         }
     } else if start.0 == RECEIVE_TIMES
         && let Some(times) = part(data, start, RECEIVE_TIMES, 16)
     {
-        device.received = Some(receive_times(times));
-        news = true;
+        news = learn_receive_times(model, id, times, at);
     } else if start.0 == UpTime::REGISTERS.0
         && let Some(up_time) = UpTime::from_bytes(data, at)
     {
@@ -115,7 +115,7 @@ pub(super) fn written(model: &mut NetworkModel, id: DeviceId, answer: &Answer<'_
         model.note_loops(write);
     }
     if is_dl_control(answer.ado, answer.written()) {
-        model.loops_ordered = Some(seen.at);
+        model.note_order(seen.at);
     }
     if touches(answer.ado, answer.written(), CLOCK_SETTING) {
         for reference in model.references.iter_mut().filter(|one| one.device == id) {
@@ -215,6 +215,10 @@ pub(super) fn broadcast_read(model: &mut NetworkModel, answer: &Answer<'_>) {
 pub(super) fn broadcast_write(model: &mut NetworkModel, answer: &Answer<'_>) {
     let data = answer.written();
     let mut news = false;
+    if touches(answer.ado, data, RECEIVE_TIMES..RECEIVE_TIMES + 1) {
+        // One copy was processed by all, the other one came the other way.
+        model.latched_in_ring = !answer.is_single && (answer.own == 0 || answer.own == answer.sum);
+    }
     if touches(answer.ado, data, CLOCK_SETTING) {
         model.references.iter_mut().for_each(|reference| reference.set(answer.at));
     }
@@ -321,12 +325,36 @@ fn dl_status(device: &Device, data: &[u8], start: RegisterAddress) -> Option<DlS
     }))
 }
 
-fn receive_times(bytes: &[u8]) -> PortMap<DcTime32> {
-    PortMap::from_fn(|port| {
+/// Takes the receive times of a controller. Says whether they tell anything.
+///
+/// In a closed ring the frame does not come back to the ports that lead on: these keep what they had, so that only a port
+/// whose time has changed since the reading before was met. A port that is closed by order, as the end of a ring is while
+/// delays are measured, keeps its time as well.
+fn learn_receive_times(
+    model: &mut NetworkModel,
+    id: DeviceId,
+    bytes: &[u8],
+    read_at: Instant,
+) -> bool {
+    let closed = model.closed_by_order(id, read_at);
+    let in_ring = model.latched_in_ring;
+    let Some(device) = model.devices.get_mut(id.index()) else { return false };
+    let latched: PortMap<DcTime32> = PortMap::from_fn(|port| {
         let at = 4 * port.index();
         let bytes = bytes.get(at..at + 4).and_then(|bytes| bytes.first_chunk());
         DcTime32(bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes)))
-    })
+    });
+    let before = device.latched.replace(latched);
+    let has_changed =
+        |port: Port| before.is_some_and(|before: PortMap<DcTime32>| before[port] != latched[port]);
+    if in_ring && !Port::ALL.into_iter().any(has_changed) {
+        return false;
+    }
+    device.received = Some(PortMap::from_fn(|port| {
+        let was_met = closed != Some(port) && (!in_ring || has_changed(port));
+        was_met.then_some(latched[port])
+    }));
+    true
 }
 
 fn touches(start: RegisterAddress, data: &[u8], range: std::ops::Range<u16>) -> bool {
