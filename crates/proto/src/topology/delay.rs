@@ -34,7 +34,8 @@ pub struct Delay {
 /// Why receive times give no delays. Controllers are indices of the tree.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, thiserror::Error)]
 pub enum DelayError {
-    /// In a closed ring no frame returns to the ports it left by.
+    /// In a closed ring no frame returns to the ports it left by, and where a branch comes behind the port that leads on, that of
+    /// the other card tells nothing either.
     #[error("the ring is closed, so the frame does not come back: measure with card B unplugged")]
     RingClosed,
     /// A controller has receive times at some open ports and not at others.
@@ -106,6 +107,37 @@ impl Delays {
         if tree.closes_at().is_some() {
             return Err(DelayError::RingClosed);
         }
+        Self::of_times(tree, card, received, difference)
+    }
+
+    /// Delays of a whole ring, from receive times that the two copies of one frame latched: that of card A came in at the
+    /// entry of each controller of the ring, that of card B, which goes round the other way, at the port that leads on.
+    /// So the frame of card A is away for as long as the one of card B came later than it would have come back,
+    /// which may be less than nothing, and is the same for all: it cancels out.
+    ///
+    /// # Errors
+    /// As [`Delays::measure`]; [`DelayError::RingClosed`] where a branch comes behind the port that leads on, for no frame of card A
+    /// gets there.
+    pub fn measure_whole_ring(
+        tree: &Tree,
+        received: &[PortMap<Option<DcTime32>>],
+        difference: Span,
+    ) -> Result<Self, DelayError> {
+        let ends_with_ring = |node: &usize| {
+            tree.open_ports(*node).last().is_some_and(|last| leads_on(tree, *node, last))
+        };
+        if !tree.ring_nodes().iter().all(ends_with_ring) {
+            return Err(DelayError::RingClosed);
+        }
+        Self::of_times(tree, Path::A, received, difference)
+    }
+
+    fn of_times(
+        tree: &Tree,
+        card: Path,
+        received: &[PortMap<Option<DcTime32>>],
+        difference: Span,
+    ) -> Result<Self, DelayError> {
         let reached = tree.first(card).map_or(&[][..], |first| tree.subtree(first));
         let mut clocks: Vec<Option<Clock>> = vec![None; tree.len()];
         let mut above = vec![Above::default(); tree.len()];
@@ -190,7 +222,7 @@ impl Clock {
         for port in tree.open_ports(node).skip(1) {
             let time = time_of(port)?;
             let gap = i64::from(time.delta(last_time));
-            if gap <= 0 {
+            if gap <= 0 && !leads_on(tree, node, port) {
                 return Err(DelayError::OutOfOrder { node, port });
             }
             clock.before[port] = clock.last;
@@ -205,6 +237,12 @@ impl Clock {
         }
         Ok(Some(clock))
     }
+}
+
+/// Whether a port of a controller of a ring leads to the next one of it, or to card B.
+fn leads_on(tree: &Tree, node: usize, port: Port) -> bool {
+    tree.link_at(End::Controller(node, port))
+        .is_some_and(|link| tree.is_on_ring(link) && port != tree.entry(node))
 }
 
 /// What lies between a controller and the MainDevice: the nearest clock, with the port that leads

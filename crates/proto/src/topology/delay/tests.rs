@@ -189,3 +189,29 @@ fn clock_granularity_does_not_make_a_delay_negative() {
     let times = [at(&[(A, 0), (B, 300)]), at(&[(A, 0), (B, 310)]), at(&[(A, 0)])];
     assert_eq!(hops(&line, &times, Span::ZERO), [None, Some(0), Some(155)]);
 }
+
+// proves: DC-07 partial
+#[test]
+fn in_a_whole_ring_the_copies_of_both_cards_give_the_delays_whichever_comes_first() {
+    let line = [FIRST, on(0, B), on(1, B)];
+    let ring = Tree::from_wiring(&line, None).unwrap().closed_at(2, B).unwrap();
+    // Cables of 100 and 200 ns. The copy of card B reaches the last one 350 ns before that of card A does, or 2,000 ns after it.
+    for later in [0_u32, 2_350] {
+        let times = [
+            at(&[(A, 1_000), (B, 1_250 + later)]),
+            at(&[(A, 5_100), (B, 5_150 + later)]),
+            at(&[(A, 9_300), (B, 8_950 + later)]),
+        ];
+        let delays = Delays::measure_whole_ring(&ring, &times, Span::ZERO).unwrap();
+        let from_reference = [0, 1, 2].map(|node| delays.of(node).unwrap().from_reference);
+        assert_eq!(from_reference, [0, 100, 300].map(Span::ns), "{later} ns");
+        let refused = Delays::measure(&ring, Path::A, &times, Span::ZERO);
+        assert_eq!(refused, Err(DelayError::RingClosed));
+    }
+    // No frame of card A gets into a branch behind the port that leads on.
+    let fork = [FIRST, on(0, B), on(0, C)];
+    let ring = Tree::from_wiring(&fork, None).unwrap().closed_at(1, B).unwrap();
+    let times = [at(&[(A, 0), (B, 400), (C, 700)]), at(&[(A, 0), (B, 100)]), at(&[(A, 0)])];
+    let refused = Delays::measure_whole_ring(&ring, &times, Span::ZERO);
+    assert_eq!(refused, Err(DelayError::RingClosed));
+}
