@@ -208,7 +208,7 @@ impl Core {
         if let Some(ends) = self.rx_reasons.frame_ends(port) {
             *ends = when + frame.duration();
         }
-        self.latch_entry(port, frame.number, when);
+        self.latch_entry(port, frame, when);
         if self.ports.loops.waits_for_frame(port) && frame.damage.is_intact() {
             self.ports.queue.push(when + frame.duration(), QueuedEvent::GoodFrame(port));
         }

@@ -4,13 +4,21 @@
 //! for the port it is processed from only; the other ports take the next frame that comes in, which
 //! is the same one as long as nothing else is on the line. An ET1200 that is entered from behind
 //! (0x0936 = 1) takes the frame before instead.
+//!
+//! Of the ports behind port A the data sheet says that they keep the time of a frame that contains such a write (S2
+//! 2.15.1, 0x0904 to 0x090F), and not that this controller has to process it: the copy that card B of a whole ring sends
+//! passes the other way round, and its times are kept as well.
 
+use linesman_proto::address::StationAddress;
+use linesman_proto::command::Command;
+use linesman_proto::frame::FrameView;
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register as r;
 use linesman_proto::register::ControllerType;
 use linesman_proto::time::Instant;
 
 use crate::controller::core::{Core, FrameProgress};
+use crate::frame::WireFrame;
 use crate::hardware::PortKind;
 
 /// Frames that came in at the ports, and whose times are kept.
@@ -62,7 +70,12 @@ impl Core {
     }
 
     /// A frame comes in at a port: its time is kept if this is the one that is waited for.
-    pub(in crate::controller) fn latch_entry(&mut self, port: Port, number: u64, when: Instant) {
+    pub(in crate::controller) fn latch_entry(
+        &mut self,
+        port: Port,
+        frame: &WireFrame,
+        when: Instant,
+    ) {
         if !self.ports.loops.is_open(port) {
             return;
         }
@@ -70,8 +83,18 @@ impl Core {
         if waited {
             self.entries.waits[port] = None;
         }
-        if waited || self.entries.latched == Some(number) {
+        if waited || self.entries.latched == Some(frame.number) || self.latches_passing(port, frame)
+        {
             self.latch_receive_time(port, when);
+        }
+    }
+
+    /// Whether a port keeps the time of a frame that this controller has not processed.
+    fn latches_passing(&self, port: Port, frame: &WireFrame) -> bool {
+        let may = port != Port::A && !self.latches_next_frame() && frame.damage.is_intact();
+        may && {
+            let station = StationAddress(self.memory.u16(&r::STATION_ADDRESS));
+            asks_for_receive_times(&frame.bytes, station)
         }
     }
 
@@ -113,4 +136,15 @@ impl Core {
         let address = usize::from(r::RECEIVE_TIME.of_port(port).0);
         self.memory.put(address, &local.to_le_bytes());
     }
+}
+
+/// Whether a frame writes to 0x0900 of the controller with this station address, by a command that latches.
+fn asks_for_receive_times(bytes: &[u8], station: StationAddress) -> bool {
+    let Ok(view) = FrameView::parse(bytes) else { return false };
+    view.datagrams().map_while(Result::ok).any(|datagram| {
+        let command = datagram.command();
+        let is_meant = command == Some(Command::Bwr)
+            || (command == Some(Command::Fpwr) && datagram.adp() == station.0);
+        is_meant && datagram.ado() == r::RECEIVE_TIME.address && !datagram.data().is_empty()
+    })
 }

@@ -109,6 +109,36 @@ fn on_a_busy_line_some_controllers_take_another_frame() {
     }
 }
 
+// S2 2.15.1, 0x0904: the time of a frame "containing a BWR or FPWR to Register 0x0900".
+#[test]
+fn a_port_keeps_the_time_of_a_latching_frame_that_passes_unprocessed() {
+    let mut bench = Bench::with(hardware(), sii(false), Box::new(NoFirmware));
+    bench.link(Port::B, true);
+    bench.wait(Span::us(100));
+    let start = bench.now;
+    let shown = |bench: &Bench, address: u16| {
+        let byte = |offset| bench.controller.register(RegisterAddress(address + offset));
+        u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)])
+    };
+    let (unit, entry) = (shown(&bench, 0x0918), shown(&bench, 0x0900));
+    let mut number = 70;
+    let mut enters = |bench: &mut Bench, after: Span, command: Command| {
+        let mut passing = frame(&[(command, at(0, 0x0900), &[0; 4])]);
+        number += 1;
+        passing.number = number;
+        bench.controller.enters(start + after, Port::B, &passing);
+    };
+    enters(&mut bench, Span::us(10), Command::Bwr);
+    let local = bench.controller.local_time(start) as u32;
+    assert_eq!(shown(&bench, 0x0904), local + 10_000);
+    // One that only reads, and one for another station.
+    for command in [Command::Brd, Command::Fpwr] {
+        enters(&mut bench, Span::us(50), command);
+        assert_eq!(shown(&bench, 0x0904), local + 10_000, "{command}");
+    }
+    assert_eq!((shown(&bench, 0x0918), shown(&bench, 0x0900)), (unit, entry));
+}
+
 #[test]
 fn an_et1200_entered_from_behind_takes_the_frame_before() {
     let mut hardware = hardware();
