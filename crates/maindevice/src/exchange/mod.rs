@@ -88,6 +88,8 @@ pub(crate) struct Exchange {
     patience: Span,
     /// Whether what one card sends arrives at the other: `None` before the first frame, or with one card.
     ring_intact: Option<bool>,
+    /// How many copies of each card have been given up since one of it came back.
+    silent: [u8; 2],
     /// How many counted in what each card received of the last broadcast read of a ring's cycle.
     responding_by_card: Option<[WorkingCounter; 2]>,
 }
@@ -109,6 +111,7 @@ impl Exchange {
             number: 0,
             patience,
             ring_intact: None,
+            silent: [0; 2],
             responding_by_card: None,
         }
     }
@@ -342,7 +345,13 @@ impl Exchange {
             self.earliest = first.unwrap_or(Instant::MAX);
             return None;
         };
-        let answered = self.slot(at).copies.arrived.contains(&true);
+        let copies = self.slot(at).copies;
+        let answered = copies.arrived.contains(&true);
+        for card in 0..2 {
+            if copies.outstanding[card] && !copies.arrived[card] {
+                self.silent[card] = self.silent[card].saturating_add(1);
+            }
+        }
         self.outgoing.remove(at);
         self.retire(at, if answered { SlotState::Answered } else { SlotState::GivenUp });
         self.count_by_card(at);

@@ -58,6 +58,9 @@ pub(super) const fn marked(origin: Origin) -> Origin {
     origin | SOURCE_MARK as Origin
 }
 
+/// A card is silent once so many of its copies in a row were given up.
+const SILENT: u8 = 3;
+
 pub(super) fn origin(source: MacAddress) -> Origin {
     let [a, b, c, d, e, f] = source.0;
     let [g, h] = ETHERTYPE_ETHERCAT.to_be_bytes();
@@ -119,6 +122,7 @@ impl Exchange {
         if head[SOURCE_AT] & SOURCE_MARK == 0 && sender == path && self.is_echo(at, frame) {
             return Received::Echo;
         }
+        self.silent[sender.index()] = 0;
         let slot = &mut self.slots[usize::from(at)];
         if slot.state != SlotState::Waiting {
             return slot.answered_again(at, now, sender);
@@ -153,8 +157,9 @@ impl Exchange {
         }
         slot.copies.arrived[copy] = true;
         self.ring_intact = Some(path != sender);
-        let Slot { purpose, sent, reply, counted, .. } = slot;
-        let prebuilt = match *purpose {
+        let purpose = slot.purpose;
+        let Slot { sent, reply, counted, .. } = slot;
+        let prebuilt = match purpose {
             Purpose::Cyclic { frame } => self.cyclic.get(frame as usize),
             Purpose::Acyclic => None,
         };
@@ -170,7 +175,11 @@ impl Exchange {
                 None => sent.get(data),
             });
         }
-        if slot.is_complete() {
+        // In a ring that is open at a card nothing of that card comes back: services need not wait for it.
+        let is_all = purpose == Purpose::Acyclic
+            && path == sender
+            && self.silent[sender.other().index()] >= SILENT;
+        if is_all || slot.is_complete() {
             self.retire(at, SlotState::Answered);
             self.count_by_card(at);
             Received::Complete(at)

@@ -6,6 +6,7 @@ use linesman_proto::time::Instant;
 use super::MainDevice;
 use crate::event::Event;
 use crate::exchange::{Purpose, Received};
+use crate::executor::lock;
 
 impl MainDevice {
     /// A frame that is not a cyclic one as it comes back nearly always.
@@ -49,6 +50,9 @@ impl MainDevice {
                 shared.events.push_back(Event::Ring { intact });
                 drop(shared);
                 self.executor.note_event();
+                if let Some(running) = self.running.as_ref().filter(|_| intact) {
+                    lock(&running.device_table).note_ring_whole();
+                }
             }
         }
     }

@@ -23,6 +23,10 @@ use crate::executor::Wire;
 const THROUGH_UNIT: Span = Span::ns(20);
 /// The bandwidth of the time loop (0x0930) that writing it anew resets all filters to.
 const SPEED_START: u16 = 0x1000;
+/// How often receive times are latched while a ring opens and closes.
+const ATTEMPTS: u32 = 4;
+/// 0x0900 to 0x090F, the receive times of all ports.
+const RECEIVE_TIMES_LEN: u16 = 4 * register::RECEIVE_TIME.len;
 /// From one frame that compensates drift to the next, at least.
 const SPACING: Span = Span::us(50);
 
@@ -38,6 +42,19 @@ pub enum ClockError {
     /// The receive times do not give delays.
     #[error("propagation delays cannot be measured: {0}")]
     Delay(#[from] DelayError),
+    /// Somebody came or went, or a ring opened or closed.
+    #[error("the line changed while receive times were latched")]
+    LineChanged,
+    /// In a whole ring a port does not keep the time of the copy that card B sends.
+    #[error(
+        "station {station}: 0x0900 of port {port} did not change as the frame of card B came by; the ring has to be open to be measured"
+    )]
+    OneWay {
+        /// Whose port it is.
+        station: StationAddress,
+        /// The port that leads on round the ring.
+        port: Port,
+    },
     /// Nobody has a clock that could be the reference.
     #[error("no reference clock: {0}")]
     NoReference(&'static str),
@@ -67,12 +84,24 @@ pub(crate) struct Latch {
     pub(crate) clocks: Vec<SeenClock>,
 }
 
-/// Latches receive times and measures the delays of all that are there.
+/// Latches receive times and measures the delays of all that are there. In a whole ring the times of both copies of the frame are
+/// taken, and it stays whole.
 ///
 /// # Errors
 /// [`ClockError`].
 pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockError> {
+    let mut attempt = 1;
+    loop {
+        match latch_once(wire, network).await {
+            Err(ClockError::LineChanged) if attempt < ATTEMPTS => attempt += 1,
+            outcome => return outcome,
+        }
+    }
+}
+
+async fn latch_once(wire: &Wire, network: Network) -> Result<Latch, ClockError> {
     let (places, _) = read_only_scan::places(wire, network).await?;
+    let ring_intact = wire.ring_intact();
     let reading: Vec<_> = (places.iter())
         .map(|place| {
             let len = EscInformation::LEN as u16;
@@ -83,12 +112,19 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
             ]
         })
         .collect();
+    let times_before: Vec<_> = (places.iter().filter(|_| ring_intact == Some(true)))
+        .map(|place| wire.read(*place, register::RECEIVE_TIME.address, RECEIVE_TIMES_LEN))
+        .collect();
     let mut seen = Vec::with_capacity(places.len());
     for [information, station, dl_status] in reading {
         let information = EscInformation::from_bytes(information.await?.bytes(0));
         let station = StationAddress(station.await?.word(0));
         let dl_status = DlStatus(dl_status.await?.word(0));
         seen.push((information.features, station, dl_status));
+    }
+    let mut before = Vec::with_capacity(times_before.len());
+    for times in times_before {
+        before.push(times.await?);
     }
     let at = wire.now();
     let all = register::RECEIVE_TIME.address;
@@ -97,7 +133,7 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
         .map(|(place, (features, ..))| {
             features.distributed_clocks().then(|| {
                 [
-                    wire.read(*place, register::RECEIVE_TIME.address, 16),
+                    wire.read(*place, register::RECEIVE_TIME.address, RECEIVE_TIMES_LEN),
                     wire.read(*place, register::RECEIVE_TIME_PROCESSING_UNIT.address, 8),
                 ]
             })
@@ -114,15 +150,24 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
         }
         let has_clock = features.distributed_clocks() && times.is_some();
         let is_wide = features.clock_64_bit();
-        let received = |port: Port| {
-            let times = times.as_ref().filter(|_| open[port])?;
-            Some(DcTime32(u32::from_le_bytes(times.bytes(4 * port.index()))))
-        };
+        let received =
+            |port: Port| times.as_ref().filter(|_| open[port]).map(|times| time_of(times, port));
         controllers.push(SeenController { open, received: PortMap::from_fn(received) });
         clocks.push(SeenClock { station, has_clock, is_wide, latched, delay: None, card: Path::A });
     }
+    if wire.ring_intact() != ring_intact {
+        // Of a frame that one half processed nothing follows for the other one.
+        return Err(ClockError::LineChanged);
+    }
+    if ring_intact == Some(true) {
+        let delays = around(&controllers, &clocks, &before)?;
+        for (node, clock) in clocks.iter_mut().enumerate() {
+            clock.delay = delays.of(node).map(|delay| delay.from_reference);
+        }
+        return Ok(Latch { at, clocks });
+    }
     let half = places.iter().position(|place| place.card() == Some(Path::B));
-    let half = half.filter(|_| wire.ring_intact() == Some(false)).unwrap_or(places.len());
+    let half = half.filter(|_| ring_intact == Some(false)).unwrap_or(places.len());
     for (path, range) in [(Path::A, 0..half), (Path::B, half..places.len())] {
         if range.is_empty() {
             continue;
@@ -137,6 +182,39 @@ pub(crate) async fn latch(wire: &Wire, network: Network) -> Result<Latch, ClockE
         }
     }
     Ok(Latch { at, clocks })
+}
+
+/// The receive time of a port, from 0x0900 and what follows.
+fn time_of(times: &Reply, port: Port) -> DcTime32 {
+    DcTime32(u32::from_le_bytes(times.bytes(4 * port.index())))
+}
+
+/// The delays in a whole ring. `before` is what stood in 0x0900 when the frame left: where the time of a port that leads on is still
+/// the same, nothing was kept there.
+fn around(
+    controllers: &[SeenController],
+    clocks: &[SeenClock],
+    before: &[Reply],
+) -> Result<Delays, ClockError> {
+    // Times of two copies do not tell where frames come in.
+    let seen: Vec<_> = controllers
+        .iter()
+        .map(|seen| SeenController { received: PortMap::default(), ..*seen })
+        .collect();
+    let tree = Reconstruction::of(Path::A, &seen).tree;
+    if tree.closes_at().is_none() {
+        // Somebody came or went meanwhile.
+        return Err(DelayError::RingClosed.into());
+    }
+    for node in tree.ring_nodes() {
+        let Some(port) = tree.open_ports(node).last() else { continue };
+        let kept = controllers[node].received[port];
+        if kept.is_some_and(|time| time == time_of(&before[node], port)) {
+            return Err(ClockError::OneWay { station: clocks[node].station, port });
+        }
+    }
+    let received: Vec<_> = controllers.iter().map(|seen| seen.received).collect();
+    Ok(Delays::measure_whole_ring(&tree, &received, THROUGH_UNIT)?)
 }
 
 /// Sets the clock of one SubDevice: what it has to add to its local time, and how far it is from the

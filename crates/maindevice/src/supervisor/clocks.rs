@@ -115,9 +115,11 @@ pub(super) async fn latch_alone(context: &Context) -> LatchRight {
 async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress, ClockError> {
     let wire = &context.wire;
     let alone = latch_alone(context).await;
-    let opened = open_ring(context).await?;
-    let latched = clock::latch(wire, context.network).await;
-    if let Some((station, control)) = opened {
+    let mut latched = clock::latch(wire, context.network).await;
+    if let Err(ClockError::OneWay { .. } | ClockError::Delay(_)) = latched
+        && let Some((station, control)) = open_ring(context).await?
+    {
+        latched = clock::latch(wire, context.network).await;
         let bytes = control.to_bytes();
         let _ = wire.write_one(station, register::DL_CONTROL.address, &bytes).await;
         lock(&context.device_table).opened_until = wire.now() + SEEN;
@@ -246,8 +248,8 @@ async fn set_beside(
     Ok(())
 }
 
-/// In a closed ring no frame comes back to the ports it left by: the last port is closed for as long
-/// as the measurement takes. Gives who it was and how its ports were.
+/// Opens a whole ring whose ports do not keep the times of both copies of a frame: the last port is closed for as long as the
+/// measurement takes, so that frames come back to the ports they left by. Gives who it was and how its ports were.
 async fn open_ring(context: &Context) -> Result<Option<(Target, DlControl)>, ClockError> {
     let wire = &context.wire;
     if wire.ring_intact() != Some(true) {

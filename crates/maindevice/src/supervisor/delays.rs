@@ -1,18 +1,21 @@
 //! Propagation delays of a line, measured again when frames may travel otherwise than before: a group came or went in the
-//! midst of it, a cable was exchanged.
+//! midst of it, a cable was exchanged, a ring is whole again.
 //!
 //! Only the delays (0x0928) are written: the clocks themselves show the right time, and would be led away from it by a
-//! delay that is no longer theirs. So nobody is given the time until they are measured. In a ring they are not: to measure
-//! there its end has to be opened.
+//! delay that is no longer theirs. So nobody is given the time until they are measured.
+//!
+//! In an open ring each half is measured for itself. What has changed in the half of the reference is not known to the other one:
+//! there the first clock keeps its delay, and what is wrong with that is in the number that frames of the second card add
+//! ([`super::open_ring`]). When the ring is whole again all are measured from the reference.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
-use linesman_proto::address::{StationAddress, WorkingCounter};
+use linesman_proto::address::{Path, StationAddress, WorkingCounter};
 use linesman_proto::register;
 use linesman_proto::time::Span;
 
 use super::{Context, clocks};
-use crate::exchange::Target;
+use crate::exchange::{ExchangeError, Target};
 use crate::executor::lock;
 use crate::procedure::clock::{self, ClockError};
 
@@ -27,6 +30,8 @@ const AGAIN: Span = Span::ms(50);
 const ATTEMPTS: u32 = 5;
 /// Number of measurements that are averaged: clocks are read in steps of 10 ns, and each hop is off by a few of them.
 const MEASUREMENTS: u32 = 4;
+/// Measurements of one line are no further apart, in ns.
+const MIXED: i64 = 200;
 /// A smaller difference is noise of the measurement.
 const NOISE: Span = Span::ns(30);
 
@@ -51,7 +56,7 @@ pub(super) async fn keep_measured(context: Context) {
         lock(&context.device_table).set_delays_known(false);
         for _ in 0..ATTEMPTS {
             measured = settled(&context).await;
-            if measure(&context).await.is_ok() {
+            if measure(&context, measured).await.is_ok() {
                 break;
             }
             context.wire.sleep(AGAIN).await;
@@ -79,46 +84,110 @@ async fn settled(context: &Context) -> Answering {
     seen
 }
 
-/// Measures the delays of all clocks that show the time, and tells them to those that have another one.
-async fn measure(context: &Context) -> Result<(), ClockError> {
+/// Measures the delays of all clocks that show the time, and tells them to those that have another one, if the line is still the one
+/// that was `settled`.
+async fn measure(context: &Context, settled: Answering) -> Result<(), ClockError> {
     let wire = &context.wire;
     let alone = clocks::latch_alone(context).await;
-    let mut sums: BTreeMap<StationAddress, (i64, u32)> = BTreeMap::new();
+    // By place: who comes first in processing order comes first.
+    let mut sums: Vec<Sum> = Vec::new();
     for _ in 0..MEASUREMENTS {
         for clock in clock::latch(wire, context.network).await?.clocks {
-            if let Some(delay) = clock.delay {
-                let (sum, times) = sums.entry(clock.station).or_default();
-                *sum += delay.as_nanos() as i64;
-                *times += 1;
-            }
+            let Some(delay) = clock.delay else { continue };
+            let known = sums.iter().position(|sum| sum.station == clock.station);
+            let at = known.unwrap_or_else(|| {
+                sums.push(Sum::new(clock.station, clock.card));
+                sums.len() - 1
+            });
+            sums[at].add(delay.as_nanos() as i64);
         }
     }
     drop(alone);
-    let mean = |station: &StationAddress| {
-        let (sum, times) = sums.get(station)?;
-        (*times == MEASUREMENTS).then(|| sum / i64::from(MEASUREMENTS))
-    };
+    if answering(context) != settled || sums.iter().any(Sum::is_mixed) {
+        return Err(ClockError::LineChanged);
+    }
     let (reference, with_time) = {
         let device_table = lock(&context.device_table);
-        (device_table.reference_clock(), device_table.with_time().collect::<Vec<_>>())
+        (device_table.reference_clock(), device_table.with_time().collect::<BTreeSet<_>>())
     };
-    // Without the reference nothing is known but differences.
-    let Some(zero) = reference.as_ref().and_then(mean) else { return Ok(()) };
+    let is_of_use = |sum: &&Sum| sum.times == MEASUREMENTS && with_time.contains(&sum.station);
+    let Some(reference) = reference else { return Ok(()) };
+    for card in Path::ALL {
+        let half: Vec<&Sum> =
+            sums.iter().filter(is_of_use).filter(|sum| sum.card == card).collect();
+        let base = half.iter().find(|sum| sum.station == reference).or(half.first());
+        if let Some(base) = base {
+            tell(context, reference, base, &half).await?;
+        }
+    }
+    Ok(())
+}
+
+/// Delays of one clock added up.
+struct Sum {
+    station: StationAddress,
+    card: Path,
+    ns: i64,
+    times: u32,
+    least: i64,
+    most: i64,
+}
+
+impl Sum {
+    const fn new(station: StationAddress, card: Path) -> Self {
+        Self { station, card, ns: 0, times: 0, least: i64::MAX, most: i64::MIN }
+    }
+
+    fn add(&mut self, ns: i64) {
+        self.ns += ns;
+        self.times += 1;
+        (self.least, self.most) = (self.least.min(ns), self.most.max(ns));
+    }
+
+    /// True if it is of before and after a change.
+    const fn is_mixed(&self) -> bool {
+        self.times == MEASUREMENTS && self.most - self.least > MIXED
+    }
+
+    const fn mean(&self) -> i64 {
+        self.ns / MEASUREMENTS as i64
+    }
+}
+
+/// Tells the clocks of a line, or of half an open ring, their delays; that of `base` stays.
+async fn tell(
+    context: &Context,
+    reference: StationAddress,
+    base: &Sum,
+    half: &[&Sum],
+) -> Result<(), ExchangeError> {
+    let wire = &context.wire;
     let register = register::SYSTEM_TIME_DELAY;
-    let asked: Vec<_> = (with_time.into_iter())
-        .filter_map(|station| {
-            let delay = u32::try_from(mean(&station)? - zero).ok()?;
-            let told = wire.read(Target::Station(station), register.address, register.len);
-            Some((station, delay, told))
+    let asked: Vec<_> = (half.iter())
+        .map(|sum| {
+            let target = Target::Station(sum.station);
+            (*sum, wire.read(target, register.address, register.len))
         })
         .collect();
-    for (station, delay, told) in asked {
-        let told = told.await?;
-        let is_other =
-            u64::from(u32::from_le_bytes(told.bytes(0)).abs_diff(delay)) >= NOISE.as_nanos();
-        if told.answered() && is_other {
+    let mut told = Vec::with_capacity(asked.len());
+    for (sum, reply) in asked {
+        let reply = reply.await?;
+        if reply.answered() {
+            told.push((sum, u32::from_le_bytes(reply.bytes(0))));
+        }
+    }
+    let of_base = told.iter().find(|(sum, _)| sum.station == base.station);
+    let zero = match of_base {
+        _ if base.station == reference => 0,
+        Some((_, delay)) => i64::from(*delay),
+        None => return Ok(()),
+    };
+    for (sum, before) in told {
+        // Who comes before the reference never sees its time.
+        let Ok(delay) = u32::try_from(zero + sum.mean() - base.mean()) else { continue };
+        if u64::from(before.abs_diff(delay)) >= NOISE.as_nanos() {
             // Who does not answer is found out by its supervisor.
-            let target = Target::Station(station);
+            let target = Target::Station(sum.station);
             let _ = wire.write_one(target, register.address, &delay.to_le_bytes()).await;
         }
     }

@@ -139,9 +139,8 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
         context.wire.spawn(async move { clocks::set_all(&setting).await });
         if context.plan.tree.closes_at().is_some() {
             context.wire.spawn(open_ring::keep_in_step(context.clone()));
-        } else {
-            context.wire.spawn(delays::keep_measured(context.clone()));
         }
+        context.wire.spawn(delays::keep_measured(context.clone()));
     } else {
         lock(&context.device_table).set_clocks_ready();
     }
@@ -157,6 +156,8 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
     }
     let mut thorough_at = context.wire.now() + THOROUGH_INTERVAL;
     let (mut located_at, mut placed_at, mut losses) = (None, None, 0);
+    // Somebody came where groups may be plugged in, and all that are planned are there: it may be a copy of one.
+    let mut are_newcomers = false;
     while !context.is_left_alone() {
         let seen = context.alerts();
         context.until_search(seen).await;
@@ -171,8 +172,10 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
                 lose(&context, device.id);
             }
         }
+        are_newcomers |= !context.plan.groups.is_empty()
+            && placed_at.is_some_and(|before| responding > Some(before));
         placed_at = responding;
-        if !search(&context).await {
+        if !search(&context).await && !are_newcomers {
             continue;
         }
         let now = context.wire.now();
@@ -184,6 +187,7 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
             // A silent line is found out by the supervisors; the next round tries again.
             if locate::again(&context).await.is_ok() {
                 (located_at, losses) = (responding, lost_groups);
+                are_newcomers = false;
             }
         }
     }

@@ -18,7 +18,7 @@ use crate::bench::Bench;
 
 /// A line of three couplers with a terminal each, and two tools: couplers with a coding switch and terminals
 /// of their own.
-const PLANT: &str = r#"
+pub(crate) const PLANT: &str = r#"
 [[device]]
 name = "K1"
 type = "EK1100"
@@ -81,7 +81,7 @@ pub(crate) fn source(profile: &DeviceProfile) -> IdentificationSource {
 
 /// What a plan says beside what a scan finds.
 #[derive(Default)]
-struct Wanted<'a> {
+pub(crate) struct Wanted<'a> {
     /// Group: first SubDevice, how many it has.
     groups: &'a [(&'a str, u32)],
     /// SubDevices with their numbers.
@@ -92,7 +92,7 @@ struct Wanted<'a> {
 }
 
 /// The plan of a plant that is complete, and its tree.
-fn plan(toml: &str, wanted: &Wanted<'_>) -> Plan {
+pub(crate) fn plan(toml: &str, wanted: &Wanted<'_>) -> Plan {
     let mut bench = Bench::with_options(toml, options(toml));
     let inventory = bench.scan();
     let mut planned = inventory.planned(AlState::Op);
@@ -118,19 +118,19 @@ fn plan(toml: &str, wanted: &Wanted<'_>) -> Plan {
     Plan::build(&planned, tree, &options).unwrap()
 }
 
-const TOOLS: Wanted<'_> = Wanted {
+pub(crate) const TOOLS: Wanted<'_> = Wanted {
     groups: &[("X", 3), ("Y", 2)],
     numbers: &[("X", 5), ("Y", 6)],
     places: Vec::new(),
     only_told: false,
 };
 
-fn options(toml: &str) -> Options {
+pub(crate) fn options(toml: &str) -> Options {
     Options { ring: toml.contains("[ring]"), ..Options::default() }
 }
 
 /// A bench that runs a plan; these are not plugged in.
-fn running(toml: &str, plan: &Plan, absent: &[&str]) -> Bench {
+pub(crate) fn running(toml: &str, plan: &Plan, absent: &[&str]) -> Bench {
     let mut bench = Bench::with_options(toml, options(toml));
     for name in absent {
         bench.segment.unplug(bench.now, name).unwrap();
@@ -143,16 +143,16 @@ fn running(toml: &str, plan: &Plan, absent: &[&str]) -> Bench {
     bench
 }
 
-fn plug(bench: &mut Bench, name: &str, on: Option<&str>) {
+pub(crate) fn plug(bench: &mut Bench, name: &str, on: Option<&str>) {
     let on = on.map(|on| on.parse().unwrap());
     bench.segment.plug(bench.now, name, on.as_ref()).unwrap();
 }
 
-fn joined(group: usize) -> impl FnMut(&Event) -> bool {
+pub(crate) fn joined(group: usize) -> impl FnMut(&Event) -> bool {
     move |event| matches!(event, Event::GroupJoined { group: at, .. } if *at == group)
 }
 
-fn place(bench: &Bench, group: usize) -> Option<GroupPlace> {
+pub(crate) fn place(bench: &Bench, group: usize) -> Option<GroupPlace> {
     bench.device.network_status().unwrap().groups()[group].place()
 }
 
@@ -255,7 +255,7 @@ fn started_otherwise(plan: &Plan, toml: &str) -> Bench {
     bench
 }
 
-fn first<'a, T>(bench: &'a Bench, is: impl Fn(&'a Event) -> Option<T>) -> Option<T> {
+pub(crate) fn first<'a, T>(bench: &'a Bench, is: impl Fn(&'a Event) -> Option<T>) -> Option<T> {
     bench.events.iter().find_map(|(_, event)| is(event))
 }
 
@@ -458,10 +458,14 @@ fn a_group_at_a_fast_port_is_in_op_before_a_usual_link_is_up() {
     let took = |bench: &mut Bench, name: &str, group: usize| {
         let plugged = bench.now;
         plug(bench, name, None);
+        let answers = |event: &Event| matches!(event, Event::Responding { .. });
+        assert!(bench.run_until(Span::s(10), answers), "{}", story(bench));
+        let connected = bench.now.since(plugged);
         assert!(bench.run_until(Span::s(10), joined(group)), "{}", story(bench));
-        bench.now.since(plugged)
+        (connected, bench.now.since(plugged))
     };
-    let (fast, usual) = (took(&mut bench, "X", 0), took(&mut bench, "Y", 1));
+    let ((link, fast), (usual_link, usual)) = (took(&mut bench, "X", 0), took(&mut bench, "Y", 1));
+    assert!(link < Span::ms(20) && usual_link > Span::ms(500), "{link}, {usual_link}");
     assert!(fast < Span::ms(300), "{fast}");
     assert!(usual > Span::s(1), "{usual}");
 }

@@ -12,6 +12,7 @@ mod ethernet;
 #[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod ethernet_rate;
 mod hot_connect;
+mod hot_connect_ports;
 mod identity;
 mod library;
 mod loop_control;
@@ -22,7 +23,6 @@ mod network_time;
 mod reference_clock;
 mod ring;
 mod ring_cuts;
-#[allow(clippy::disallowed_macros, reason = "it prints tables for people")]
 mod ring_soak;
 mod robust;
 mod rounds;

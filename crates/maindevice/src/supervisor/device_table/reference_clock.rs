@@ -96,6 +96,14 @@ impl DeviceTable {
         }
     }
 
+    /// The ring is whole again: what has changed in one half meanwhile, the other one does not know.
+    pub(crate) fn note_ring_whole(&mut self) {
+        if self.delays_known.is_some() {
+            self.set_delays_known(false);
+            self.alert();
+        }
+    }
+
     /// Notes what is added to the time in frames of the second card; `None`: they hand none round.
     pub(crate) fn set_second_card_ns(&mut self, ns: Option<i64>) {
         self.second_card_ns = ns;
