@@ -5,7 +5,7 @@
 //! writes and others read without a lock: a reader that meets a change looks again, a few times.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
 
 use linesman_proto::time::{DcTime, Instant};
 
@@ -14,13 +14,20 @@ pub(crate) const SPEED_PLACES: u32 = 48;
 /// So often a reader looks again.
 const ATTEMPTS: u32 = 8;
 
-/// Networks of one process. Copies are the same group; all count their [`Instant`]s from the same moment.
+/// Place of a network among the networks of one process that keep one time. All count their [`Instant`]s from the same
+/// moment.
 #[derive(Clone, Debug, Default)]
-pub struct NetworkGroup(Arc<ToldTime>);
+pub struct NetworkGroup {
+    told: Arc<ToldTime>,
+    rank: usize,
+}
 
 #[derive(Debug, Default)]
 struct ToldTime {
-    is_led: AtomicBool,
+    /// The rank of the one that leads, counted from 1; 0: nobody does.
+    leader: AtomicUsize,
+    /// Networks below this rank have begun, or never will.
+    begun: AtomicUsize,
     /// Odd while the others are being written; 0: nothing was told yet.
     version: AtomicU64,
     at: AtomicU64,
@@ -47,30 +54,58 @@ impl TimePair {
 
 /// The one that leads a group, until it is dropped.
 #[derive(Debug)]
-pub(crate) struct GroupLead(NetworkGroup);
+pub(crate) struct GroupLead(Arc<ToldTime>);
+
+/// Turn of a network to begin; dropped, those behind it need not wait for it any more.
+#[derive(Debug)]
+pub(crate) struct GroupTurn(NetworkGroup);
 
 impl NetworkGroup {
-    /// A group without networks.
+    /// A group whose networks begin when they like; copies are the same place.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
+    /// Places of a group whose networks begin one after the other, so that the first of them that has clocks leads.
+    #[must_use]
+    pub fn in_order(count: usize) -> Vec<Self> {
+        let told = Arc::<ToldTime>::default();
+        (0..count).map(|rank| Self { told: Arc::clone(&told), rank }).collect()
+    }
+
     /// True while one of its networks leads.
     #[must_use]
     pub fn is_led(&self) -> bool {
-        self.0.is_led.load(Ordering::Acquire)
+        self.leader().is_some()
+    }
+
+    /// Place of the network that leads, from 0 in the order of [`NetworkGroup::in_order`]; `None` while nobody does.
+    #[must_use]
+    pub fn leader(&self) -> Option<usize> {
+        self.told.leader.load(Ordering::Acquire).checked_sub(1)
     }
 
     /// The lead, if nobody has it.
     pub(crate) fn lead(&self) -> Option<GroupLead> {
-        let was_led = self.0.is_led.swap(true, Ordering::AcqRel);
-        (!was_led).then(|| GroupLead(self.clone()))
+        let order = Ordering::AcqRel;
+        let taken = self.told.leader.compare_exchange(0, self.rank + 1, order, Ordering::Acquire);
+        taken.is_ok().then(|| GroupLead(Arc::clone(&self.told)))
+    }
+
+    /// Its turn to begin.
+    pub(crate) fn turn(&self) -> GroupTurn {
+        GroupTurn(self.clone())
+    }
+
+    /// True while one before it has neither begun nor given up.
+    pub(crate) fn waits(&self) -> bool {
+        self.told.begun.load(Ordering::Acquire) < self.rank
     }
 
     /// What was told last; `None` before that, or if it changes all the time.
     pub(crate) fn told(&self) -> Option<TimePair> {
-        let told = &self.0;
+        let told = &self.told;
         for _ in 0..ATTEMPTS {
             let before = told.version.load(Ordering::SeqCst);
             if before == 0 {
@@ -90,7 +125,7 @@ impl NetworkGroup {
 impl GroupLead {
     /// Tells the others the time.
     pub(crate) fn tell(&self, pair: TimePair) {
-        let told = &self.0.0;
+        let told = &self.0;
         told.version.fetch_add(1, Ordering::SeqCst);
         told.at.store(pair.at.as_nanos(), Ordering::SeqCst);
         told.time.store(pair.time, Ordering::SeqCst);
@@ -101,7 +136,13 @@ impl GroupLead {
 
 impl Drop for GroupLead {
     fn drop(&mut self) {
-        self.0.0.is_led.store(false, Ordering::Release);
+        self.0.leader.store(0, Ordering::Release);
+    }
+}
+
+impl Drop for GroupTurn {
+    fn drop(&mut self) {
+        self.0.told.begun.fetch_max(self.0.rank + 1, Ordering::AcqRel);
     }
 }
 
@@ -116,6 +157,20 @@ mod tests {
         assert!(group.is_led() && group.lead().is_none());
         drop(lead);
         assert!(!group.is_led() && group.lead().is_some());
+    }
+
+    #[test]
+    fn networks_in_order_wait_until_those_before_them_have_begun_or_are_gone() {
+        let group = NetworkGroup::in_order(3);
+        let waiting = || group.iter().map(NetworkGroup::waits).collect::<Vec<_>>();
+        let mut turns: Vec<_> = group.iter().map(NetworkGroup::turn).collect();
+        assert_eq!(waiting(), [false, true, true]);
+        drop(turns.remove(0));
+        assert_eq!(waiting(), [false, false, true]);
+        let _lead = group[1].lead().expect("the first did not want to");
+        assert_eq!(group[2].leader(), Some(1));
+        drop(turns);
+        assert_eq!(waiting(), [false; 3]);
     }
 
     #[test]

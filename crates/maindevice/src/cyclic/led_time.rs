@@ -91,6 +91,8 @@ pub(super) struct LedTime {
     offset: Option<i64>,
     held: Option<HeldClock>,
     pairs: OutsidePairs,
+    /// How far the network is ahead of the one that leads, in ns.
+    ahead_of_group: Option<i64>,
 }
 
 impl LedTime {
@@ -109,7 +111,13 @@ impl LedTime {
             (Some(TimeSource::Device(_)), _) => LedBy::Outside(Some(stamps?)),
             (None, Some(group)) => LedBy::Group(group),
         };
-        Some(Self { source, offset: None, held: None, pairs: OutsidePairs::default() })
+        let (offset, held, ahead_of_group) = (None, None, None);
+        Some(Self { source, offset, held, pairs: OutsidePairs::default(), ahead_of_group })
+    }
+
+    /// How far the network is ahead of the one that leads its group, in ns, with the last frame.
+    pub(super) const fn ahead_of_group(&self) -> Option<i64> {
+        self.ahead_of_group
     }
 
     /// What is known of the clock outside, if it is one.
@@ -120,6 +128,7 @@ impl LedTime {
     /// The clocks were set anew: the time begins anew with them.
     pub(super) fn restart(&mut self) {
         (self.offset, self.held, self.pairs) = (None, None, OutsidePairs::default());
+        self.ahead_of_group = None;
     }
 
     /// The time for a frame that leaves at `departed`. `None` while there is none: then nothing is written.
@@ -145,6 +154,9 @@ impl LedTime {
             }
         };
         let ahead = shown.0.wrapping_sub(source) as i64;
+        if matches!(self.source, LedBy::Group(_)) {
+            self.ahead_of_group = Some(ahead);
+        }
         let offset =
             self.offset.get_or_insert(if ahead.unsigned_abs() <= SAME { 0 } else { ahead });
         // Who leads has set its clocks anew: its speed goes on, its time is another one.

@@ -210,6 +210,11 @@ impl Cyclic {
         }
     }
 
+    /// How far it is ahead of the network that leads its group, in ns, if it follows one.
+    pub(crate) fn ahead_of_group(&self) -> Option<i64> {
+        self.led_time.as_ref()?.ahead_of_group()
+    }
+
     /// How far the clock outside is ahead, if there is one.
     pub(crate) fn outside_time(&self) -> Option<OutsideTime> {
         self.led_time.as_ref()?.outside()

@@ -76,6 +76,8 @@ impl MainDevice {
         let scan_cache = lock(&self.scan_cache).take();
         let wire = self.command();
         let follows = self.join_group(&mut plan);
+        // Those that come behind it in its group may begin.
+        self.turn = None;
         let plan = Arc::new(plan);
         let mut device_table = DeviceTable::new(&plan);
         device_table.set_hold(self.options.hold_at);

@@ -22,7 +22,7 @@ use crate::exchange::{
 };
 use crate::executor::{Executor, Wire, lock};
 use crate::mailbox::MailboxQueues;
-use crate::network_group::GroupLead;
+use crate::network_group::{GroupLead, GroupTurn, NetworkGroup};
 use crate::options::Options;
 use crate::procedure::scan::ScanCache;
 use crate::service::ServiceOnly;
@@ -56,6 +56,8 @@ pub struct MainDevice {
     next_service: u64,
     /// It leads the other networks of the process.
     lead: Option<Arc<GroupLead>>,
+    /// Until it begins, those that come behind it in its group wait.
+    turn: Option<GroupTurn>,
     /// Requests on their way from procedures to the exchange.
     submitted: VecDeque<(Ticket, Request)>,
     /// How many frames of procedures may still go out in this cycle.
@@ -77,6 +79,7 @@ impl MainDevice {
     pub fn new(network: Network, options: Options) -> Self {
         let mut executor = Executor::new();
         let aside = executor.group(options.repeats);
+        let turn = options.group.as_ref().map(NetworkGroup::turn);
         Self {
             network,
             exchange: Exchange::new(options.sources, options.ring, options.patience),
@@ -90,6 +93,7 @@ impl MainDevice {
             scan_cache: Arc::default(),
             next_service: 0,
             lead: None,
+            turn,
             submitted: VecDeque::new(),
             acyclic_left: 0,
         }

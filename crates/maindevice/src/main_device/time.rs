@@ -4,6 +4,7 @@ use linesman_proto::time::{DcTime, Instant};
 
 use super::MainDevice;
 use crate::cyclic::{OutsideTime, TaskTimes};
+use crate::network_group::NetworkGroup;
 
 impl MainDevice {
     /// The time of the network at a time of the run (ns since 2000): that which the reference clock has when a frame
@@ -30,6 +31,20 @@ impl MainDevice {
     #[must_use]
     pub const fn leads_group(&self) -> bool {
         self.lead.is_some()
+    }
+
+    /// True while a network before it in its group has neither begun nor given up: then it is to wait, if the first is to
+    /// lead. Of a group [in order](crate::NetworkGroup::in_order) only.
+    #[must_use]
+    pub fn waits_for_group(&self) -> bool {
+        self.turn.is_some() && self.options.group.as_ref().is_some_and(NetworkGroup::waits)
+    }
+
+    /// By how many ns the time of this network is ahead of that of the network that leads its group, as its frames have it;
+    /// negative: it is behind. `None` where it leads, follows nobody, or the time of one of both is not known yet.
+    #[must_use]
+    pub fn ahead_of_group(&self) -> Option<i64> {
+        self.running.as_ref()?.cyclic.ahead_of_group()
     }
 
     /// Tells a time outside of the network, as it was at `at`, where the plan has the network follow a time that a program
