@@ -22,6 +22,9 @@ use crate::session::SessionHooks;
 /// seconds.
 pub const SCAN_PATIENCE: Span = Span::s(60);
 
+/// So often a network looks whether those that lead it have begun.
+const GROUP_POLL: Span = Span::ms(1);
+
 /// Plan that is to be run.
 pub enum PlanSource {
     /// A plan that is made already.
@@ -69,6 +72,8 @@ pub struct PlanRun<A, D> {
     io_at: IoAt,
     plan: Option<Arc<Plan>>,
     begun: bool,
+    /// It waits for networks that lead it; then it is looked again.
+    waits_until: Option<Instant>,
     scan_until: Instant,
     reached_at: Option<Instant>,
     failure: Option<RunFailure>,
@@ -97,6 +102,7 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
             io_at: IoAt::TaskBegin,
             plan: None,
             begun: false,
+            waits_until: None,
             scan_until: Instant::MAX,
             reached_at: None,
             failure: None,
@@ -319,8 +325,11 @@ impl<A: Application, D: DiagnosisInput> SessionHooks for PlanRun<A, D> {
 
     fn turn(&mut self, now: Instant, main: &mut MainDevice) -> bool {
         if !self.begun {
-            self.begun = true;
-            self.begin(now, main);
+            self.waits_until = main.waits_for_group().then(|| now + GROUP_POLL);
+            if self.waits_until.is_none() {
+                self.begun = true;
+                self.begin(now, main);
+            }
         }
         if self.plan.is_none() && now > self.scan_until && self.failure.is_none() {
             let words =
@@ -342,6 +351,6 @@ impl<A: Application, D: DiagnosisInput> SessionHooks for PlanRun<A, D> {
 
     fn poll_timeout(&self) -> Option<Instant> {
         let ending = self.ending.as_ref().map(Ending::due);
-        [ending, self.diagnosis.poll_timeout()].into_iter().flatten().min()
+        [ending, self.waits_until, self.diagnosis.poll_timeout()].into_iter().flatten().min()
     }
 }
