@@ -55,6 +55,7 @@ fn driven<L: Transport<Error = LinkError>>(
         allowed_misses: None,
         hold: false,
         diagnose: Some(Setup::default()),
+        group: None,
     };
     let (notes, told) = sync_channel(NOTES);
     let beside =

@@ -110,6 +110,7 @@ fn in_run(file: &SegmentFile, cycle: Span, active: bool) -> Option<Diagnosis> {
         allowed_misses: None,
         hold: false,
         diagnose: Some(setup),
+        group: None,
     };
     let (notes, _told) = sync_channel(NOTES);
     let beside =

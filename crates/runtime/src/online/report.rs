@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ethernet::EthernetReport;
 use crate::gateway::GatewayReport;
+use crate::run::group::GroupTime;
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "linesman.online/1";
@@ -37,6 +38,9 @@ pub struct OnlineReport {
     /// The time of the network; `null`: no clocks are in use.
     #[serde(default)]
     pub clock: Option<OnlineClock>,
+    /// How this network stands to the others of the run; `null`: it is the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<GroupTime>,
     /// The SubDevices, by number.
     pub devices: Vec<OnlineDevice>,
     /// The hot connect groups, in the order of the plan.

@@ -65,6 +65,10 @@ pub struct Snapshot {
     pub responding: Option<WorkingCounter>,
     /// The same by the card that received it, card A first; of a ring only.
     pub responding_by_card: Option<[WorkingCounter; 2]>,
+    /// True if the network leads the others of the process.
+    pub leads_group: bool,
+    /// How far it is ahead of the one that leads, in ns.
+    pub ahead_of_group: Option<i64>,
     /// Mailboxes in which something went wrong: whose, how often, and what stands.
     pub mailboxes: Vec<(DeviceId, u64, Vec<ProtocolError>)>,
 }
@@ -82,6 +86,8 @@ impl Snapshot {
             frames: Vec::new(),
             responding: main.responding(),
             responding_by_card: main.responding_by_card(),
+            leads_group: main.leads_group(),
+            ahead_of_group: main.ahead_of_group(),
             mailboxes: Vec::new(),
         };
         if let Some(plan) = main.plan() {

@@ -14,6 +14,7 @@ use super::report::{Card, OnlineReport};
 use super::snapshot::Snapshot;
 use crate::ethernet::EthernetWatch;
 use crate::gateway::GatewayWatch;
+use crate::run::NetworkPlace;
 
 /// So long after the last frame that a card did not take it counts as taking them again.
 const FORGIVEN_AFTER: Span = Span::s(1);
@@ -37,6 +38,8 @@ struct OnlineShared {
     ethernet: Option<EthernetWatch>,
     /// Counts of the mailbox gateway beside the run.
     gateway: Option<GatewayWatch>,
+    /// Its place among the networks of the run.
+    group: Option<NetworkPlace>,
 }
 
 impl OnlineState {
@@ -60,6 +63,11 @@ impl OnlineState {
     /// A virtual switch passes frames of SubDevices on.
     pub fn set_ethernet(&self, watch: EthernetWatch) {
         self.lock().ethernet = Some(watch);
+    }
+
+    /// It is one of several networks of a run.
+    pub fn set_group(&self, place: NetworkPlace) {
+        self.lock().group = Some(place);
     }
 
     /// A mailbox gateway is open.
@@ -146,6 +154,8 @@ impl OnlineState {
         report.cards.clone_from(&inner.cards);
         let ethernet = inner.ethernet.as_ref().map(EthernetWatch::report);
         report.ethernet = ethernet.filter(|one| !one.is_idle());
+        let group = inner.group.as_ref();
+        report.group = group.map(|it| it.time(snapshot.leads_group, snapshot.ahead_of_group));
         report.gateway = inner.gateway.as_ref().map(GatewayWatch::report);
         Some(report)
     }

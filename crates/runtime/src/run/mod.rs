@@ -8,6 +8,7 @@
 pub mod bring_up;
 pub mod diagnosis_input;
 pub mod diagnosis_thread;
+pub mod group;
 pub mod note;
 pub mod plan_choices;
 pub mod real_time;
@@ -17,6 +18,7 @@ pub mod session;
 pub mod shared;
 pub mod tap;
 
+pub use group::NetworkPlace;
 pub use linesman_session::{Application, Idle, Io, MakePlan, Next, PlanSource};
 pub use note::{Note, RunError};
 pub use plan_choices::PlanChoices;

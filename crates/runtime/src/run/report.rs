@@ -9,6 +9,7 @@ use linesman_proto::time::{Instant, Span};
 use serde::{Deserialize, Serialize};
 
 use super::bring_up::BringUpReport;
+use super::group::GroupTime;
 use super::real_time::GrantedRealTime;
 use crate::ethernet::EthernetReport;
 use crate::gateway::GatewayReport;
@@ -57,6 +58,9 @@ pub struct RunReport {
     /// What went through the virtual switch; `null`: no SubDevice speaks EoE, and no interface was wanted.
     #[serde(default)]
     pub ethernet: Option<EthernetReport>,
+    /// How this network stands to the others of the run; `null`: it is the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub group: Option<GroupTime>,
     /// Hot connect groups that were plugged in and are kept in INIT, each with the reason and the next step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_taken: Vec<String>,

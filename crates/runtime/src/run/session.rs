@@ -17,6 +17,7 @@ use linesman_session::{Application, PlanRun, PlanSource, SessionHooks};
 
 use super::diagnosis_input::RunDiagnosis;
 use super::diagnosis_thread::DiagnosisObserver;
+use super::group::NetworkPlace;
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, not_taken, of_plan};
@@ -51,6 +52,8 @@ pub struct SessionOptions {
     pub hold: bool,
     /// How the line is judged while it runs; `None`: it is not.
     pub diagnose: Option<Setup>,
+    /// Networks of this process that keep one time, this one among them; `None`: it is alone.
+    pub group: Option<NetworkPlace>,
 }
 
 /// Room for notes that are on their way to whoever listens.
@@ -72,6 +75,7 @@ pub struct RunSession<A> {
     begun_at: Instant,
     granted: GrantedRealTime,
     on: String,
+    group: Option<NetworkPlace>,
 }
 
 impl<A: Application> RunSession<A> {
@@ -131,6 +135,7 @@ impl<A: Application> RunSession<A> {
             host: (&self.granted).into(),
             gateway: self.gateway.as_ref().map(MailboxGateway::report),
             ethernet: self.ethernet.as_ref().and_then(VirtualEthernet::report),
+            group: self.group.as_ref().map(|place| place.report(main)),
             not_taken: self
                 .run
                 .plan()

@@ -14,7 +14,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_session::segment_line::SegmentLine;
 use linesman_sim::segment::Segment;
 
-use super::{FrameSink, Transport};
+use super::{FrameSink, TimeShare, Transport};
 use crate::wiring::Wiring;
 
 /// How fast virtual time goes.
@@ -33,6 +33,8 @@ pub struct SegmentTransport {
     pace: Pace,
     clock: HostClock,
     waker: Waker,
+    /// Its place among lines that have one time.
+    share: Option<TimeShare>,
 }
 
 impl SegmentTransport {
@@ -53,6 +55,7 @@ impl SegmentTransport {
             pace,
             clock: HostClock::start(),
             waker: Waker::new()?,
+            share: None,
         })
     }
 
@@ -65,6 +68,11 @@ impl SegmentTransport {
     /// The segment, to break and heal it, or to set what its inputs see.
     pub const fn segment_mut(&mut self) -> &mut Segment {
         self.line.segment_mut()
+    }
+
+    /// Goes on in step with the other lines that share a time.
+    pub fn share_time(&mut self, share: TimeShare) {
+        self.share = Some(share);
     }
 
     /// What wakes the thread that waits.
@@ -107,6 +115,9 @@ impl Transport for SegmentTransport {
 
     fn wait(&mut self, deadline: Instant) -> Result<(), LinkError> {
         let until = self.line.poll_timeout().min(deadline);
+        if let Some(share) = &self.share {
+            share.wait(until.max(self.line.now()));
+        }
         if self.pace == Pace::Host && until > self.clock.now() {
             let waker: &dyn Waitable = &self.waker;
             wait_any([waker], &self.clock, until)?;

@@ -15,6 +15,7 @@ use linesman_session::{Application, Io, PlanRun, PlanSource, SessionHooks};
 use super::super::bring_up::BringUpReport;
 use super::super::diagnosis_input::{InlineDiagnosis, RunDiagnosis};
 use super::super::diagnosis_thread::{DiagnosisObserver, DiagnosisOutput, judge};
+use super::super::group::NetworkPlace;
 use super::super::note::{Note, RunError};
 use super::super::real_time::RealTime;
 use super::super::tap::tap;
@@ -87,7 +88,8 @@ pub fn start_observed<'a, L: Transport<Error = LinkError>, A: Application>(
     let granted = options.real_time.map(RealTime::ask).unwrap_or_default();
     let allowed_misses = options.allowed_misses.filter(|_| !application.is_idle());
     let hold_at = options.hold.then_some(AlState::PreOp);
-    let settings = Options { allowed_misses, hold_at, ..line.options() };
+    let group = options.group.as_ref().map(NetworkPlace::network);
+    let settings = Options { allowed_misses, hold_at, group, ..line.options() };
     let begun_at = line.now();
     let hooks = RunSession {
         run: PlanRun::new(Some(wanted), application, diagnosis, options.hold),
@@ -101,6 +103,7 @@ pub fn start_observed<'a, L: Transport<Error = LinkError>, A: Application>(
         begun_at,
         granted,
         on: options.on.clone(),
+        group: options.group.clone(),
     };
     Ok(StartedRun {
         driver: Driver::new(line, settings, hooks),
