@@ -303,6 +303,7 @@ impl Segment {
             allowed_misses: Some(options.misses),
             hold: options.hold,
             diagnose: options.diagnosed.then(setup),
+            group: None,
         };
         let served = ServedApplication {
             application,
