@@ -114,7 +114,10 @@ impl Command {
             Self::Counters(arguments) => Some(&arguments.line),
             Self::Probe(arguments) => Some(&arguments.line),
             Self::Online(arguments) => arguments.place.as_deref(),
-            Self::Run(arguments) => Some(&arguments.on),
+            Self::Run(arguments) => match arguments.on.as_slice() {
+                [place] => Some(place),
+                _ => None,
+            },
             Self::Sdo(arguments) => Some(&arguments.place.line),
             Self::History(arguments) => Some(&arguments.place.line),
             Self::Foe(arguments) => Some(&arguments.place.line),

@@ -1,46 +1,36 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
+mod drive;
 pub(super) mod ethernet;
 pub(super) mod gateway;
 mod reporter;
+pub(super) mod several;
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::time::Duration;
 
 use linesman_config::eni::Eni;
 use linesman_config::plan::{Plan, PlannedExchange};
 use linesman_config::project::Project;
-use linesman_diagnosis::report::Verdict;
-use linesman_diagnosis::{Engine, InputKind, Setup};
+use linesman_diagnosis::{InputKind, Setup};
 use linesman_link::clock::HostClock;
-use linesman_link::error::LinkError;
-use linesman_link::socket::WakeHandle;
 use linesman_link::unix_time::UnixTime;
 use linesman_maindevice::watch::EntryKind;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
-use linesman_runtime::bundle::{BundleReceiver, BundleRecorder, RecordedEngine};
-use linesman_runtime::ethernet::VirtualEthernet;
 use linesman_runtime::event_log::{EventLog, EventLogWriter};
-use linesman_runtime::gateway::MailboxGateway;
 use linesman_runtime::online::OnlineState;
 use linesman_runtime::plan_file::PlanFile;
-use linesman_runtime::run::diagnosis_thread::DiagnosisObserver;
-use linesman_runtime::run::{
-    self as running, Idle, NOTES, PlanChoices, PlanSource, RealTime, RunControls, RunOutcome,
-    SessionOptions, Shared,
-};
+use linesman_runtime::run::{PlanChoices, PlanSource, RealTime, SessionOptions};
 use linesman_runtime::selector::Selector;
-use linesman_runtime::service::{ControlSocketWatch, ServiceSocket};
-use linesman_runtime::stop::Stop;
 use linesman_runtime::system_log::SystemLog;
-use linesman_runtime::transport::{Cards, Pace, Transport};
+use linesman_runtime::transport::{Cards, Pace, TimeShare};
 
+use self::drive::{Companions, NetworkRun};
 use self::ethernet::EthernetArguments;
 use self::gateway::GatewayArguments;
 use self::reporter::{Logs, RunReporter};
-use super::bundle::recording::{self, BundleArguments};
+use self::several::NetworkChoices;
+use super::bundle::recording::BundleArguments;
 use super::line_access;
 use crate::amount::{MICROSECOND, count as count_of, cycle, duration, lasting};
 use crate::exit::Status;
@@ -49,12 +39,6 @@ use crate::files;
 use crate::output::Output;
 use crate::text::quantity::count;
 use crate::version;
-
-/// After so long without news, what was waited with is told.
-const QUIET: Duration = Duration::from_millis(100);
-
-/// So often it is looked whether logs and socket still work.
-const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Longest ENI file that is read, in bytes.
 const MOST: u64 = 256 * 1024 * 1024;
@@ -71,12 +55,13 @@ const MOST: u64 = 256 * 1024 * 1024;
 )]
 pub(crate) struct Arguments {
     /// The project (TOML), or a configuration of another tool (ENI); without one, what is there is run
-    /// as it is
+    /// as it is. Of several networks one each, in the order of --on
     #[arg(value_name = "PROJECT.toml|ENI.xml")]
-    file: Option<PathBuf>,
-    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml
-    #[arg(long, value_name = "WHERE")]
-    pub(crate) on: String,
+    files: Vec<PathBuf>,
+    /// Where the line is: eth0, eth0+eth1 (a ring) or sim:plant.toml. Given several times: several networks that have one
+    /// time, which the first leads
+    #[arg(long, value_name = "WHERE", required = true)]
+    pub(crate) on: Vec<String>,
     /// End after so long (60, 10m); else Ctrl-C ends it
     #[arg(long, visible_alias = "for", value_name = "SECONDS", value_parser = lasting())]
     seconds: Option<Span>,
@@ -105,9 +90,9 @@ pub(crate) struct Arguments {
     )]
     spin_us: Span,
     /// Another program is the application: it sees the process image in this file, such as
-    /// /dev/shm/machine
+    /// /dev/shm/machine. Of several networks one each, in the order of --on
     #[arg(long, value_name = "FILE")]
-    image: Option<PathBuf>,
+    image: Vec<PathBuf>,
     /// How many cycles in a row that program may give no outputs before they are withheld (10, 2k)
     #[arg(
         long,
@@ -120,9 +105,10 @@ pub(crate) struct Arguments {
     /// Leave all SubDevices in PREOP until that program gives outputs for the first time
     #[arg(long, requires = "image")]
     wait_for_outputs: bool,
-    /// Open a socket for service commands beside the run; it is there once the line is being driven
+    /// Open a socket for service commands beside the run; it is there once the line is being driven. Of several networks
+    /// one each, in the order of --on
     #[arg(long, value_name = "SOCKET")]
-    control: Option<PathBuf>,
+    control: Vec<PathBuf>,
     #[command(flatten)]
     gateway: GatewayArguments,
     #[command(flatten)]
@@ -132,9 +118,10 @@ pub(crate) struct Arguments {
     /// Do not judge the line meanwhile
     #[arg(long, conflicts_with = "bundles")]
     no_diagnosis: bool,
-    /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there
+    /// Keep what happens in an event log, for `linesman log`; runs are added to a file that is there. Of several networks
+    /// one each, in the order of --on
     #[arg(long, value_name = "FILE")]
-    log: Option<PathBuf>,
+    log: Vec<PathBuf>,
     /// Tell and log nothing of this kind (as in `linesman log --kind`): counter, link, state and others; may be
     /// given several times
     #[arg(long, value_name = "KIND", value_parser = super::log::kind)]
@@ -142,7 +129,7 @@ pub(crate) struct Arguments {
     /// Tell the log of the system, too: `journalctl SYSLOG_IDENTIFIER=linesman`
     #[arg(long)]
     system_log: bool,
-    /// At the end one JSON object, schema linesman.run/1, and nothing else
+    /// At the end one JSON object, schema linesman.run/1, and nothing else; of several networks linesman.runs/1
     #[arg(long)]
     pub(crate) json: bool,
 }
@@ -154,134 +141,203 @@ fn state(word: &str) -> Result<AlState, String> {
     found.ok_or_else(|| "expected INIT, PREOP, SAFEOP or OP".to_owned())
 }
 
-/// Drives the line.
+/// Drives the line, or several.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
-    let selector: Selector = arguments.on.parse()?;
-    let lasts = arguments.seconds;
-    let source = match &arguments.file {
-        Some(path) => Source::read(path, arguments.cycle_us, output)?,
-        None => Source::AsFound,
-    };
-    let choices =
-        PlanChoices { target: arguments.to, cycle: arguments.cycle_us, ..PlanChoices::default() };
-    let title = match (&source, &arguments.file) {
-        (Source::Project(project), Some(path)) => {
-            format!("{} of {}", count(project.devices.len() as u64, "SubDevice"), path.display())
+    let selectors = arguments.on.iter().map(|on| on.parse()).collect::<Result<Vec<_>, _>>()?;
+    let networks = several::networks(arguments)?;
+    for (on, selector) in arguments.on.iter().zip(&selectors) {
+        if matches!(selector, Selector::Listen(_) | Selector::File(_)) {
+            return Err(line_access::not_drivable(on, selector));
         }
-        (Source::Planned(plan, _), Some(path)) => {
-            format!("{} of {}", count(plan.devices.len() as u64, "SubDevice"), path.display())
+    }
+    if selectors.iter().all(|selector| matches!(selector, Selector::Cards(_))) {
+        return on_cards(arguments, &selectors, networks, output);
+    }
+    on_segments(arguments, &selectors, networks, output)
+}
+
+/// Drives lines on cards of this computer.
+fn on_cards(
+    arguments: &Arguments,
+    selectors: &[Selector],
+    networks: Vec<NetworkChoices<'_>>,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    let sources = sources(arguments, &networks, output)?;
+    // Times of all networks count from the same moment.
+    let clock = HostClock::start();
+    let began = clock.started_at();
+    let real_time = Some(RealTime {
+        priority: (arguments.priority > 0).then_some(arguments.priority),
+        cpu: arguments.cpu,
+        lock_memory: arguments.priority > 0,
+    });
+    let stop = line_access::stop()?;
+    let mut runs = Vec::new();
+    for ((network, source), selector) in networks.into_iter().zip(sources).zip(selectors) {
+        let Selector::Cards(names) = selector else { continue };
+        let mut run = network.prepare(arguments, source, began)?;
+        line_access::refuse(names)?;
+        let mut line = Cards::open(names, clock)?;
+        line.set_spin(arguments.spin_us);
+        let bundles = arguments.bundles.start(began, names)?;
+        run.open(arguments, line.wake_handle(), bundles, &stop)?;
+        run.options = with_source(run.options, real_time, began.rfc3339());
+        runs.push((line, run));
+    }
+    drive::drive(runs, &stop, arguments.json, output)
+}
+
+/// Drives virtual lines in this process.
+fn on_segments(
+    arguments: &Arguments,
+    selectors: &[Selector],
+    networks: Vec<NetworkChoices<'_>>,
+    output: &mut Output,
+) -> Result<Status, Failure> {
+    let sources = sources(arguments, &networks, output)?;
+    // Without an end it goes no faster than the host's clock, for a person to look on; so it does for the IP stack of
+    // this computer.
+    let free = arguments.seconds.is_some() && !arguments.ethernet.wants_interface();
+    let pace = if free { Pace::Free } else { Pace::Host };
+    let began = HostClock::start().started_at();
+    let stop = line_access::stop()?;
+    let mut runs = Vec::new();
+    let mut shares = TimeShare::of(selectors.len()).into_iter();
+    for ((network, source), selector) in networks.into_iter().zip(sources).zip(selectors) {
+        let Selector::Segment(path) = selector else { continue };
+        let mut run = network.prepare(arguments, source, began)?;
+        let mut line = line_access::virtual_line(path, pace)?;
+        if let Some(share) = shares.next()
+            && selectors.len() > 1
+        {
+            line.share_time(share);
         }
-        _ => "what is there".to_owned(),
+        // A virtual run has no date.
+        let bundles = arguments.bundles.start(UnixTime::EPOCH, &[])?;
+        run.open(arguments, line.wake_handle(), bundles, &stop)?;
+        if let Some(setup) = &mut run.options.diagnose {
+            setup.clock = "virtual".to_owned();
+        }
+        runs.push((line, run));
+    }
+    drive::drive(runs, &stop, arguments.json, output)
+}
+
+fn sources(
+    arguments: &Arguments,
+    networks: &[NetworkChoices<'_>],
+    output: &Output,
+) -> Result<Vec<Source>, Failure> {
+    let read = |network: &NetworkChoices<'_>| match network.file {
+        Some(path) => Source::read(path, arguments.cycle_us, output),
+        None => Ok(Source::AsFound),
     };
-    let wanted_gateway = arguments.gateway.wanted(&source)?;
-    let setup = (!arguments.no_diagnosis).then(|| Setup {
+    networks.iter().map(read).collect()
+}
+
+impl NetworkChoices<'_> {
+    /// Makes what a run needs of its source, but for the line.
+    fn prepare(
+        self,
+        arguments: &Arguments,
+        source: Source,
+        began: UnixTime,
+    ) -> Result<NetworkRun, Failure> {
+        let choices = PlanChoices {
+            target: arguments.to,
+            cycle: arguments.cycle_us,
+            ..PlanChoices::default()
+        };
+        let title = match (&source, self.file) {
+            (Source::Project(project), Some(path)) => {
+                let devices = project.devices.len() as u64;
+                format!("{} of {}", count(devices, "SubDevice"), path.display())
+            }
+            (Source::Planned(plan, _), Some(path)) => {
+                format!("{} of {}", count(plan.devices.len() as u64, "SubDevice"), path.display())
+            }
+            _ => "what is there".to_owned(),
+        };
+        let gateway_options = arguments.gateway.wanted(&source)?;
+        let options = SessionOptions {
+            on: self.on.to_owned(),
+            leave: arguments.leave,
+            lasts: arguments.seconds,
+            real_time: None,
+            allowed_misses: self
+                .image
+                .is_some()
+                .then_some(u32::try_from(arguments.misses).unwrap_or(u32::MAX)),
+            hold: arguments.wait_for_outputs,
+            diagnose: (!arguments.no_diagnosis).then(|| setup(&source, self.on)),
+            group: self.place.clone(),
+        };
+        let wanted = match source {
+            Source::Project(project) => choices.project(*project),
+            Source::Planned(mut plan, _) => {
+                for device in &mut plan.devices {
+                    device.target = device.target.min(arguments.to);
+                }
+                PlanSource::Plan(plan)
+            }
+            Source::AsFound => choices.as_found(),
+        };
+        let log = match self.log {
+            Some(path) => {
+                let project = self.file.map_or_else(String::new, |file| file.display().to_string());
+                let log = EventLog::create(path)?;
+                Some(EventLogWriter::start(log, began, self.on, &project, &version::tool())?)
+            }
+            None => None,
+        };
+        let online = OnlineState::new(self.on);
+        let system_log = match arguments.system_log {
+            true => Some(SystemLog::open(self.on).map_err(no_journal)?),
+            false => None,
+        };
+        let without = arguments.log_without.clone();
+        let logs = Logs { file: log, system: system_log, without };
+        let (json, several) = (arguments.json, self.place.is_some());
+        let reporter = RunReporter::new(json, self.on, several, began, logs, online.clone());
+        if let Some(place) = self.place {
+            online.set_group(place);
+        }
+        let said = format!(
+            "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
+            self.on, arguments.to, arguments.leave
+        );
+        Ok(NetworkRun {
+            wanted,
+            options,
+            image: self.image.cloned(),
+            control: self.control.cloned(),
+            gateway_options,
+            companions: Companions::default(),
+            online,
+            said,
+            reporter,
+        })
+    }
+}
+
+/// How a line is judged.
+fn setup(source: &Source, on: &str) -> Setup {
+    Setup {
         input: InputKind::Driven,
-        project: match &source {
+        project: match source {
             Source::Project(project) => Some((**project).clone()),
             Source::Planned(_, project) => project.as_deref().cloned(),
             Source::AsFound => None,
         },
-        exchange: match &source {
+        exchange: match source {
             Source::Planned(plan, _) => plan.exchange(),
             Source::AsFound | Source::Project(_) => PlannedExchange::default(),
         },
-        source: arguments.on.clone(),
+        source: on.to_owned(),
         probes: true,
         host_counters: true,
         ..Setup::default()
-    });
-    let options = SessionOptions {
-        on: arguments.on.clone(),
-        leave: arguments.leave,
-        lasts,
-        real_time: None,
-        allowed_misses: arguments
-            .image
-            .is_some()
-            .then_some(u32::try_from(arguments.misses).unwrap_or(u32::MAX)),
-        hold: arguments.wait_for_outputs,
-        diagnose: setup,
-    };
-    let wanted = match source {
-        Source::Project(project) => choices.project(*project),
-        Source::Planned(mut plan, _) => {
-            for device in &mut plan.devices {
-                device.target = device.target.min(arguments.to);
-            }
-            PlanSource::Plan(plan)
-        }
-        Source::AsFound => choices.as_found(),
-    };
-    let clock = HostClock::start();
-    let began = clock.started_at();
-    let log = match &arguments.log {
-        Some(path) => {
-            let project = arguments
-                .file
-                .as_deref()
-                .map_or_else(String::new, |file| file.display().to_string());
-            let log = EventLog::create(path)?;
-            Some(EventLogWriter::start(log, began, &arguments.on, &project, &version::tool())?)
-        }
-        None => None,
-    };
-    let online = OnlineState::new(&arguments.on);
-    let system_log = match arguments.system_log {
-        true => Some(SystemLog::open(&arguments.on).map_err(no_journal)?),
-        false => None,
-    };
-    let without = arguments.log_without.clone();
-    let logs = Logs { file: log, system: system_log, without };
-    let reporter = RunReporter::new(arguments.json, began, logs, online.clone());
-    let application = arguments.image.clone();
-    let stop = line_access::stop()?;
-    let said = format!(
-        "Drives {title} on {} to {}; Ctrl-C stops it: outputs to zero, all back to {}.",
-        arguments.on, arguments.to, arguments.leave
-    );
-    match &selector {
-        Selector::Cards(names) => {
-            line_access::refuse(names)?;
-            let mut line = Cards::open(names, clock)?;
-            line.set_spin(arguments.spin_us);
-            stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
-            let gateway = gateway::open(wanted_gateway, line.wake_handle(), online.clone())?;
-            let ethernet = arguments.ethernet.open(line.wake_handle())?;
-            online.set_ethernet(ethernet.watch());
-            let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
-            let real_time = Some(RealTime {
-                priority: (arguments.priority > 0).then_some(arguments.priority),
-                cpu: arguments.cpu,
-                lock_memory: arguments.priority > 0,
-            });
-            let options = with_source(options, real_time, began.rfc3339());
-            let bundles = arguments.bundles.start(began, names)?;
-            let beside = (socket, gateway, ethernet, bundles);
-            drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
-        }
-        Selector::Segment(path) => {
-            // Without an end it goes no faster than the host's clock, for a person to look on; so it does for the IP stack of
-            // this computer.
-            let free = lasts.is_some() && !arguments.ethernet.wants_interface();
-            let pace = if free { Pace::Free } else { Pace::Host };
-            let line = line_access::virtual_line(path, pace)?;
-            stop.wakes(&line.wake_handle()).map_err(line_access::no_wake_handle)?;
-            let gateway = gateway::open(wanted_gateway, line.wake_handle(), online.clone())?;
-            let ethernet = arguments.ethernet.open(line.wake_handle())?;
-            online.set_ethernet(ethernet.watch());
-            let socket = socket(arguments.control.as_deref(), line.wake_handle(), online)?;
-            let mut options = options;
-            if let Some(setup) = &mut options.diagnose {
-                setup.clock = "virtual".to_owned();
-            }
-            // A virtual run has no date.
-            let bundles = arguments.bundles.start(UnixTime::EPOCH, &[])?;
-            let beside = (socket, gateway, ethernet, bundles);
-            drive(line, wanted, &options, application, beside, &stop, &said, reporter, output)
-        }
-        Selector::Listen(_) | Selector::File(_) => {
-            Err(line_access::not_drivable(&arguments.on, &selector))
-        }
     }
 }
 
@@ -309,20 +365,6 @@ impl Source {
     }
 }
 
-/// The socket for services, if one is wanted.
-fn socket(
-    path: Option<&Path>,
-    wake_handle: WakeHandle,
-    online: OnlineState,
-) -> Result<Option<ServiceSocket>, Failure> {
-    let Some(path) = path else { return Ok(None) };
-    let socket = ServiceSocket::open(path, wake_handle, online).map_err(|error| {
-        let reason = format!("{}: opening the socket: {error}", path.display());
-        Failure::new(reason, "name a path where nothing is, in a folder that you may write to")
-    })?;
-    Ok(Some(socket))
-}
-
 fn no_journal(error: std::io::Error) -> Failure {
     Failure::new(
         format!("--system-log: reaching journald at /run/systemd/journal/socket: {error}"),
@@ -342,139 +384,4 @@ fn with_source(
         setup.start = start;
     }
     options
-}
-
-/// The diagnosis of the run, with a recorder of bundles beside it where one is wanted.
-fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn DiagnosisObserver> {
-    let engine = Engine::new(setup);
-    match recorder {
-        Some(recorder) => Box::new(RecordedEngine::new(engine, recorder)),
-        None => Box::new(engine),
-    }
-}
-
-/// What runs beside the line.
-type RunCompanions = (
-    Option<ServiceSocket>,
-    Option<MailboxGateway>,
-    VirtualEthernet,
-    Option<(BundleRecorder, BundleReceiver)>,
-);
-
-/// Runs the line in a thread of its own, and tells what happens meanwhile.
-#[allow(clippy::too_many_arguments, reason = "called twice, from above")]
-fn drive<L: Transport<Error = LinkError> + Send>(
-    line: L,
-    wanted: PlanSource,
-    options: &SessionOptions,
-    image: Option<PathBuf>,
-    (socket, gateway, ethernet, bundles): RunCompanions,
-    stop: &Stop,
-    said: &str,
-    mut reporter: RunReporter,
-    output: &mut Output,
-) -> Result<Status, Failure> {
-    reporter.line(said, output);
-    if let Some(gateway) = &gateway {
-        reporter.line(&gateway::opened(gateway), output);
-    }
-    if let Some(text) = ethernet::opened(&ethernet) {
-        reporter.line(&text, output);
-    }
-    let (notes, told) = mpsc::sync_channel(NOTES);
-    let socket_watch = socket.as_ref().map(ServiceSocket::watch);
-    let (recorder, news) = bundles.unzip();
-    let look = |reporter: &mut RunReporter, output: &mut Output| {
-        reporter.look_at_logs(output);
-        if let Some(news) = &news {
-            recording::tell(news, !reporter.is_json(), output);
-        }
-        if let Some(why) = socket_watch.as_ref().and_then(ControlSocketWatch::trouble) {
-            reporter.complain(&why, output);
-        }
-    };
-    let ended = std::thread::scope(|scope| {
-        let beside = RunControls { stop, notes, socket, gateway, ethernet: Some(ethernet) };
-        let judge = move |setup| observer(setup, recorder);
-        let work = move || match image {
-            None => running::run_observed(line, wanted, Idle, options, beside, judge),
-            Some(path) => {
-                running::run_observed(line, wanted, Shared::at(path), options, beside, judge)
-            }
-        };
-        let thread = scope.spawn(work);
-        let mut looked = std::time::Instant::now();
-        loop {
-            if looked.elapsed() >= LOOK_EVERY {
-                looked = std::time::Instant::now();
-                look(&mut reporter, output);
-            }
-            match told.recv_timeout(QUIET) {
-                Ok(note) => reporter.note(&note, output),
-                Err(RecvTimeoutError::Timeout) => {
-                    reporter.flush(output);
-                    output.look_for_reader();
-                }
-                Err(RecvTimeoutError::Disconnected) => break,
-            }
-            // A connection that broke, without a terminal, leaves nothing but this behind.
-            if output.is_closed() && !stop.is_set() {
-                output.warn("nobody reads standard output any more: the line is stopped");
-                stop.set();
-            }
-        }
-        reporter.flush(output);
-        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    });
-    look(&mut reporter, output);
-    let lasted = ended.as_ref().map_or(Span::ZERO, |ended| Span::ns(ended.report.time_ns));
-    if let Some((lost, why)) = reporter.lost() {
-        reporter
-            .complain(&format!("{lost} entries are missing in the system's log: {why}"), output);
-    }
-    if let Some(log) = reporter.finish(lasted)
-        && (log.dropped > 0 || log.failure.is_some())
-    {
-        let why = log.failure.unwrap_or_else(|| "too much at once".to_owned());
-        reporter.complain(&why, output);
-        let lost = format!("{} missing in the event log", count(log.dropped, "event"));
-        reporter.complain(&lost, output);
-    }
-    let RunOutcome { mut report, error, failed } =
-        ended.map_err(|error| line_access::nobody(&error).at(&options.on))?;
-    if let Some(diagnosis) = &mut report.diagnosis {
-        diagnosis.tool = version::tool();
-    }
-    if reporter.is_json() {
-        output.json(&report);
-    } else {
-        output.text(&reporter::summary(&report, output.paint()));
-        if let Some(diagnosis) = &report.diagnosis {
-            output.text(&reporter::findings(diagnosis, reporter.names(), output));
-        }
-    }
-    if report.counts.untold > 0 {
-        let lost = count(report.counts.untold, "event");
-        reporter.complain(
-            &format!("{lost} neither told nor logged. Do: end other programs on this computer"),
-            output,
-        );
-    }
-    if let Some(error) = error {
-        return Err(line_access::nobody(&error).at(&options.on));
-    }
-    if let Some(failure) = failed {
-        // It was said when it happened.
-        reporter.failed(&failure, output);
-        return Ok(Status::NotJudged);
-    }
-    let faulty =
-        report.diagnosis.as_ref().is_some_and(|diagnosis| diagnosis.verdict == Verdict::Faulty);
-    Ok(if faulty || report.reached_ns.is_none() || !report.not_taken.is_empty() {
-        Status::Findings
-    } else if report.counts.undiagnosed > 0 {
-        Status::Inconclusive
-    } else {
-        Status::Good
-    })
 }

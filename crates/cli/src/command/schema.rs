@@ -22,6 +22,7 @@ use super::interfaces;
 use super::lab::replay::ReplayReport;
 use super::log::LogReport;
 use super::plan::report::PlanReport;
+use super::run::several::RunReports;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
 use super::{
@@ -90,6 +91,8 @@ pub(crate) enum Name {
     Log,
     /// `run --json`
     Run,
+    /// `run --json` of several networks
+    Runs,
     /// `online --json`, and a line of `online --live --json`
     Online,
     /// A line that the control socket of `run` takes
@@ -162,6 +165,7 @@ fn schema(name: Name) -> Schema {
         Name::Control => schema_for!(Request),
         Name::Log => schema_for!(LogReport),
         Name::Run => schema_for!(RunReport),
+        Name::Runs => schema_for!(RunReports),
         Name::Online => schema_for!(OnlineReport),
         Name::ServiceRequest => schema_for!(linesman_runtime::service::message::Request),
         Name::Service => schema_for!(linesman_runtime::service::message::Answer),

@@ -6,6 +6,7 @@ pub(crate) mod devices;
 pub(crate) mod diagnosis;
 pub(crate) mod drawing;
 pub(crate) mod finding;
+pub(crate) mod group;
 pub(crate) mod main_device;
 pub(crate) mod names;
 pub(crate) mod quantity;

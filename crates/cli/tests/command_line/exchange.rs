@@ -229,6 +229,7 @@ fn drive(line: Watched, wanted: PlanSource, program: impl Application, lasts: Op
         allowed_misses: Some(2),
         hold: false,
         diagnose: None,
+        group: None,
     };
     let (notes, _told) = sync_channel(1);
     let beside =

@@ -52,6 +52,7 @@ mod library;
 mod live;
 mod locks;
 mod log;
+mod networks;
 mod observations;
 mod offline;
 mod online;

@@ -114,6 +114,7 @@ fn record(folder: &FilePath, project: &str) -> std::path::PathBuf {
         allowed_misses: Some(2),
         hold: false,
         diagnose: None,
+        group: None,
     };
     let (notes, _told) = sync_channel(1);
     let beside =

@@ -77,6 +77,8 @@ const HELD: Span = Span::ms(50);
 /// Tells what happens to findings.
 pub(crate) struct Follower {
     json: bool,
+    /// What stands before each line for people: the line, where there are several.
+    prefix: String,
     /// What people have not been told yet, oldest first.
     held: Vec<Event>,
     /// Findings that people were told of, by their ids.
@@ -86,7 +88,12 @@ pub(crate) struct Follower {
 impl Follower {
     /// One that writes text or JSON lines.
     pub(crate) const fn new(json: bool) -> Self {
-        Self { json, held: Vec::new(), told: BTreeSet::new() }
+        Self { json, prefix: String::new(), held: Vec::new(), told: BTreeSet::new() }
+    }
+
+    /// One that writes text, each line with this before it.
+    pub(crate) const fn with_prefix(prefix: String) -> Self {
+        Self { json: false, prefix, held: Vec::new(), told: BTreeSet::new() }
     }
 
     /// Tells what happened to a finding: a program at once, people a moment later.
@@ -137,7 +144,8 @@ impl Follower {
         }
         self.told.insert(finding.id.clone());
         let line = format!(
-            "{:>12}  {:<9}  {} {} at {}: {}",
+            "{}{:>12}  {:<9}  {} {} at {}: {}",
+            self.prefix,
             time(at.as_nanos()),
             EventName::of(*kind).word(),
             finding.code,

@@ -7,6 +7,7 @@ use linesman_runtime::online::report::{
 
 use crate::command::run::{ethernet, gateway};
 use crate::output::{Output, Paint, Table};
+use crate::text::group::group_time;
 use crate::text::quantity::{count, grouped, time};
 
 /// The table; with an earlier report it tells what has changed since.
@@ -229,6 +230,9 @@ fn frames(report: &OnlineReport) -> String {
         text.push_str(&format!(
             "The network's time, that of {reference}, is {off} {how} the host's.\n"
         ));
+    }
+    if let Some(group) = &report.group {
+        text.push_str(&format!("{}\n", group_time(group)));
     }
     if let Some(counts) = report.responding_by_card {
         text.push_str(&by_card(report, counts));

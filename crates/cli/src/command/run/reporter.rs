@@ -21,12 +21,17 @@ use crate::command::diagnose::follow::{Follower, event_word};
 use crate::failure::Failure;
 use crate::output::{Output, Paint, Table};
 use crate::text::finding::{Writer, percent, tally};
+use crate::text::group::group_time;
 use crate::text::names::Names;
 use crate::text::quantity::{count, grouped, time};
 
 /// Tells what happens.
 pub(super) struct RunReporter {
     json: bool,
+    /// The line.
+    on: String,
+    /// What stands before each line for people: the line, where there are several.
+    prefix: String,
     names: Names,
     follower: Follower,
     online: OnlineState,
@@ -63,10 +68,24 @@ pub(super) struct Logs {
 }
 
 impl RunReporter {
-    pub(super) fn new(json: bool, began: UnixTime, logs: Logs, online: OnlineState) -> Self {
-        let follower = Follower::new(false);
+    pub(super) fn new(
+        json: bool,
+        on: &str,
+        several: bool,
+        began: UnixTime,
+        logs: Logs,
+        online: OnlineState,
+    ) -> Self {
+        let prefix = if several { format!("{on}: ") } else { String::new() };
+        let follower = Follower::with_prefix(prefix.clone());
         let (counted, failures) = (HashMap::new(), Vec::new());
-        Self { json, names: Names::default(), follower, online, began, logs, counted, failures }
+        let (on, names) = (on.to_owned(), Names::default());
+        Self { json, on, prefix, names, follower, online, began, logs, counted, failures }
+    }
+
+    /// The line, as it was named.
+    pub(super) fn on(&self) -> &str {
+        &self.on
     }
 
     /// What the SubDevices are called.
@@ -82,7 +101,7 @@ impl RunReporter {
     /// A line for people.
     pub(super) fn line(&self, text: &str, output: &mut Output) {
         if !self.json {
-            output.line(text);
+            output.line(&format!("{}{text}", self.prefix));
         }
     }
 
@@ -364,6 +383,9 @@ pub(super) fn summary(report: &RunReport, paint: Paint) -> String {
             at(lateness.p999_ns),
             at(lateness.max_ns)
         ));
+    }
+    if let Some(group) = &report.group {
+        text.push_str(&format!("{}\n", group_time(group)));
     }
     for not_taken in &report.not_taken {
         text.push_str(&format!("Not taken: {not_taken}\n"));
