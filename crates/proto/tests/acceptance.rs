@@ -1,7 +1,7 @@
 //! Acceptance cases of the requirements that are pure calculation or decoding, through what others
 //! can call.
 
-use linesman_proto::address::{LogicalAddress, RegisterAddress};
+use linesman_proto::address::{DeviceId, LogicalAddress, Position, RegisterAddress};
 use linesman_proto::command::Command;
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::builder::DatagramAddress;
@@ -23,6 +23,48 @@ fn frame(lens: &[usize]) -> Vec<u8> {
     }
     let len = builder.finish();
     buffer[..len].to_vec()
+}
+
+/// The address of a datagram, as it is read back from a frame.
+fn sent_and_read(command: Command, address: DatagramAddress) -> DatagramAddress {
+    let mut buffer = [0; 1514];
+    let mut builder = FrameBuilder::new(&mut buffer, MacAddress([2, 0, 0, 0, 0, 1]));
+    builder.push(command, 0, address, 2).expect("it fits");
+    let len = builder.finish();
+    let view = FrameView::parse(&buffer[..len]).unwrap();
+    let datagram = view.datagrams().next().unwrap().unwrap();
+    match address {
+        DatagramAddress::Logical(_) => DatagramAddress::Logical(datagram.logical()),
+        DatagramAddress::Physical(..) => DatagramAddress::Physical(datagram.adp(), datagram.ado()),
+    }
+}
+
+// proves: ESC-01
+#[test]
+fn the_last_of_65_535_subdevices_is_reached_by_position_by_station_and_by_logical_address() {
+    const COUNT: u32 = 65_535;
+    let last = Position(u16::try_from(COUNT - 1).unwrap());
+    let register = RegisterAddress(0x0130);
+    let read =
+        sent_and_read(Command::Aprd, DatagramAddress::Physical(last.auto_increment(), register));
+    let DatagramAddress::Physical(adp, _) = read else { panic!("{read:?}") };
+    // Each SubDevice adds 1; whoever sees 0 is meant.
+    let reached = (0..u16::MAX).find(|passed| adp.wrapping_add(*passed) == 0);
+    assert_eq!(reached, Some(last.0));
+    // So many station addresses there are besides 0, which is that of nobody.
+    let station = u16::try_from(COUNT).unwrap();
+    let read = sent_and_read(Command::Fprd, DatagramAddress::Physical(station, register));
+    assert_eq!(read, DatagramAddress::Physical(0xFFFF, register));
+    // Each may have 65,537 bytes of the logical addresses for itself.
+    let each = u32::MAX / COUNT;
+    let begins = LogicalAddress((COUNT - 1) * each);
+    assert_eq!(
+        sent_and_read(Command::Lrd, DatagramAddress::Logical(begins)),
+        DatagramAddress::Logical(begins)
+    );
+    assert!(each == 65_537 && begins.0.checked_add(each - 1).is_some());
+    // And it has a number for people.
+    assert_eq!(DeviceId(COUNT - 1).no(), COUNT);
 }
 
 // proves: FRM-01

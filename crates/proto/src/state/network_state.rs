@@ -87,12 +87,32 @@ impl fmt::Display for NetworkState {
 mod tests {
     use super::*;
 
-    // proves: PLC-07 partial
+    // proves: PLC-07 (U)
     #[test]
     fn each_of_the_thirteen_bits_has_a_text() {
         assert_eq!(NetworkState(0).to_string(), "OK");
         let all = TEXTS.iter().fold(0, |all, (bit, _)| all | bit);
         assert_eq!(all, 0x1FFF);
+        // S0 L2573-2593, from the lowest bit on.
+        let words = [
+            "link error",
+            "locked",
+            "redundancy",
+            "missing",
+            "resources",
+            "watchdog",
+            "driver",
+            "reset",
+            "INIT",
+            "PREOP",
+            "SAFEOP",
+            "in error",
+            "clocks not in sync",
+        ];
+        for (at, word) in words.into_iter().enumerate() {
+            let text = NetworkState(1 << at).to_string();
+            assert!(text.contains(word), "{:#06X}: {text}", 1 << at);
+        }
         let word = NetworkState::default()
             .with(NetworkState::SOME_SAFEOP, true)
             .with(NetworkState::SOME_ERROR, true);
