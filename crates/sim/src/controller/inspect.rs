@@ -2,7 +2,7 @@
 //! set.
 
 use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress};
-use linesman_proto::mailbox::coe::Emergency;
+use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::register::{self as r, AlStatus, DlStatus, ErrorCounter, ErrorCounters};
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::{Instant, Span};
@@ -101,6 +101,17 @@ impl Controller {
         self.firmware.software_fault(software_fault, begins);
         self.core.call_firmware(at);
         self.reschedule();
+    }
+
+    /// A number in the dictionary of its processor; `None` where there is none.
+    #[must_use]
+    pub fn object_number(&self, address: ObjectAddress) -> Option<u64> {
+        self.firmware.number(address)
+    }
+
+    /// Something inside the device sets a number in the dictionary of its processor.
+    pub(crate) fn set_object_number(&mut self, address: ObjectAddress, value: u64) {
+        self.firmware.set_number(address, value);
     }
 
     /// The processor of the device has crashed and runs again from `at` on, without a reset of the

@@ -5,7 +5,7 @@
 
 use std::fmt::Debug;
 
-use linesman_proto::mailbox::coe::Emergency;
+use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
@@ -110,6 +110,14 @@ pub trait Firmware: Debug + Send {
     /// Its software misbehaves from now on, or no longer. It outlives a restart. Faults go through
     /// [`Controller::software_fault`](crate::controller::Controller::software_fault).
     fn software_fault(&mut self, _fault: SoftwareFault, _begins: bool) {}
+
+    /// A number in its dictionary; `None` where it has none there. For what is wired to it inside its housing.
+    fn number(&self, _address: ObjectAddress) -> Option<u64> {
+        None
+    }
+
+    /// Sets such a number from the device's side.
+    fn set_number(&mut self, _address: ObjectAddress, _value: u64) {}
 
     /// The processor crashed and has started anew, without its controller: registers stay, what the
     /// software knew is forgotten.

@@ -4,6 +4,7 @@
 //! at one ([`Segment::poll_arrival`]). Time is an argument and never goes back; nothing happens
 //! between two calls that does not depend on them alone, so the same calls give the same bytes.
 
+mod bridge;
 mod build;
 mod build_deviations;
 mod capture_probe;
@@ -25,6 +26,7 @@ use linesman_proto::register::{ErrorCounter, WATCHDOG_COUNTER_PDI, WATCHDOG_COUN
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Tree;
 
+pub use bridge::BridgedSides;
 pub use build::BuildError;
 pub use capture_probe::{ProbeFrame, ProbePlaceError};
 pub use card::{FrameTally, HostPort};

@@ -1,6 +1,6 @@
 //! Firmware interface of a device with a processor, as its controller calls it.
 
-use linesman_proto::mailbox::coe::Emergency;
+use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::sii::Protocols;
 use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::{Instant, Span};
@@ -91,6 +91,16 @@ impl Firmware for Processor {
             self.software_faults.begin(software_fault);
         } else {
             self.software_faults.end(software_fault);
+        }
+    }
+
+    fn number(&self, address: ObjectAddress) -> Option<u64> {
+        self.dictionary.find(address).map(|at| self.dictionary.number(at))
+    }
+
+    fn set_number(&mut self, address: ObjectAddress, value: u64) {
+        if let Some(at) = self.dictionary.find(address) {
+            self.dictionary.set_number(at, value);
         }
     }
 
