@@ -247,6 +247,47 @@ fn a_running_line_counts_the_subdevices_of_groups_that_are_there() {
     assert_eq!(names(&bench), expected);
 }
 
+// S0 L2609-2616, S1 L1225-1257.
+// proves: PLC-10 (S)
+#[test]
+fn topology_list_of_a_running_line_has_neighbours_and_says_which_group_is_there() {
+    let plan = plan(PLANT, &TOOLS);
+    let mut bench = running(PLANT, &plan, &["X", "Y"]);
+    let word = |bytes: &[u8; 64], at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let entries = |bench: &Bench| -> Vec<(String, [u8; 64])> {
+        let list = bench.device.network_status().unwrap().topology(&plan);
+        let name = |id| bench.segment.name(id).to_owned();
+        list.iter().map(|entry| (name(entry.id), entry.to_bytes())).collect()
+    };
+    let of = |bench: &Bench, name: &str| {
+        entries(bench).into_iter().find(|(of, _)| of == name).expect("it is planned").1
+    };
+    assert_eq!(entries(&bench).len(), 10);
+    let station = |name: &str, bench: &Bench| plan.device(bench.id(name)).unwrap().station.0;
+    let (k1, k2) = (of(&bench, "K1"), of(&bench, "K2"));
+    assert_eq!(word(&k1, 0), station("K1", &bench), "its own station address");
+    // Ports A to D: the MainDevice, the terminals, the other coupler, none.
+    let neighbours = [0, station("T1", &bench), station("K2", &bench), 0];
+    assert_eq!([4, 6, 8, 10].map(|at| word(&k1, at)), neighbours);
+    assert_eq!(word(&k2, 4), station("K1", &bench), "the other end of that cable");
+    // There, in a group, first of one; and how many of groups are planned and there.
+    let state = |bench: &Bench, name: &str| {
+        let bytes = of(bench, name);
+        (bytes[36] & 0b1_1100, word(&bytes, 40), word(&bytes, 42))
+    };
+    assert_eq!(state(&bench, "T1"), (4, 5, 0));
+    assert_eq!(state(&bench, "Y"), (8 | 16, 5, 0), "planned, not there");
+    plug(&mut bench, "Y", None);
+    assert!(bench.run_until(Span::s(10), joined(1)));
+    bench.run_for(Span::s(1));
+    assert_eq!(state(&bench, "Y"), (4 | 8 | 16, 5, 2));
+    assert_eq!(state(&bench, "Y1"), (4 | 16, 5, 2));
+    assert_eq!(state(&bench, "X"), (8 | 16, 5, 2));
+    bench.segment.unplug(bench.now, "Y").unwrap();
+    bench.run_for(Span::ms(500));
+    assert_eq!(state(&bench, "Y"), (8 | 16, 5, 0), "{}", story(&bench));
+}
+
 /// The events of a plant that is started with all plugged in, whose numbers are otherwise than planned.
 fn started_otherwise(plan: &Plan, toml: &str) -> Bench {
     let mut bench = Bench::new(toml);

@@ -5,6 +5,7 @@ use linesman_config::project::{ClockChoice, Project, SyncLeader, TimeChoice, Tim
 use linesman_maindevice::{NetworkGroup, Options};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{DcTime, Span};
+use linesman_sim::segment::BridgedSides;
 
 use crate::bench::Bench;
 use crate::clocks::{plan, start};
@@ -225,7 +226,7 @@ fn clock_terminal_sets_the_mode_its_speed_is_taken_over_and_its_offset_told_and_
     assert!(off.abs() < 2_000, "{off} ns");
 }
 
-// proves: DC-12 partial: networks that a program puts into one group; those of `linesman run` are in none
+// proves: DC-12
 #[test]
 fn of_two_networks_of_a_process_the_first_leads_and_the_other_follows_without_a_setting() {
     let group = NetworkGroup::new();
@@ -268,6 +269,7 @@ fn of_two_networks_of_a_process_the_first_leads_and_the_other_follows_without_a_
 struct BridgedNetworks {
     primary: Bench,
     secondary: Bench,
+    bridge: BridgedSides,
 }
 
 impl BridgedNetworks {
@@ -275,9 +277,7 @@ impl BridgedNetworks {
         for side in [&mut self.primary, &mut self.secondary] {
             side.run_for(Span::ms(1));
         }
-        let times = [&self.primary, &self.secondary].map(|side| shown(side, CLOCK_TERMINAL));
-        tell_ahead(&mut self.primary, CLOCK_TERMINAL, times[1]);
-        tell_ahead(&mut self.secondary, CLOCK_TERMINAL, times[0]);
+        self.bridge.exchange(&mut self.primary.segment, &mut self.secondary.segment);
     }
 
     /// How far the time of the secondary network is ahead of that of the primary one.
@@ -311,7 +311,12 @@ fn bridged(type_name: &str, choose: [&dyn Fn(&mut Project); 2]) -> BridgedNetwor
     for bench in [&mut primary, &mut secondary] {
         bench.run_for(from.since(bench.now));
     }
-    BridgedNetworks { primary, secondary }
+    let bridge = BridgedSides {
+        primary: CLOCK_TERMINAL,
+        secondary: CLOCK_TERMINAL,
+        fetches_direction: type_name == "EL6692",
+    };
+    BridgedNetworks { primary, secondary, bridge }
 }
 
 fn by_device(project: &mut Project) {
@@ -323,8 +328,9 @@ fn by_itself(project: &mut Project) {
     project.devices[2].time_stamps = Some(TimeStampForm::Bits64);
 }
 
-// proves: DC-15 partial: what either side measures of the other is set by the test
-// proves: DC-17 partial: what either side measures of the other is set by the test
+// The bridge takes both times itself; of its sides one sits on the E-bus, the other on a cable.
+// proves: DC-15
+// proves: DC-17
 #[test]
 fn bridge_keeps_two_networks_in_step_in_the_direction_that_both_maindevices_set() {
     type Choice = fn(&mut Project);
@@ -357,18 +363,18 @@ fn bridge_keeps_two_networks_in_step_in_the_direction_that_both_maindevices_set(
     }
 }
 
-// proves: DC-16 partial: the setting of the primary side is written to both, it does not cross the bridge
+// proves: DC-16
 #[test]
 fn side_of_a_bridge_that_leads_is_set_in_it_and_the_form_of_time_stamps_selects_its_process_data() {
     for (leader, follows) in
         [(SyncLeader::Primary, [false, true]), (SyncLeader::Secondary, [true, false])]
     {
-        // Both would follow: the bridge says who does.
+        // Both would follow: the bridge says who does. It is told on its primary side only.
         let choose = |project: &mut Project| {
             by_device(project);
             project.devices[2].sync_leader = Some(leader);
         };
-        let mut networks = bridged("EL6692", [&choose, &choose]);
+        let mut networks = bridged("EL6692", [&choose, &by_device]);
         (0..3_000).for_each(|_| networks.step());
         let sides = [&networks.primary, &networks.secondary];
         assert_eq!(sides.map(|side| side.device.outside_time().is_some()), follows, "{leader:?}");
@@ -422,6 +428,11 @@ fn local_network_takes_the_speed_of_an_upper_one_that_a_program_tells() {
 
 /// A network behind a port multiplier, whose clock is 23 ppm fast in all of them.
 fn behind_multiplier(own_ppm: f64) -> String {
+    behind("M1", 23.0, own_ppm)
+}
+
+/// A network behind a port multiplier that is so many ppm fast.
+fn behind(multiplier: &str, ppm: f64, own_ppm: f64) -> String {
     let device = |name: &str, kind: &str, on: &str, ppm: f64| {
         format!(
             "[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\nclock_ppm = {ppm:.1}\n\
@@ -430,14 +441,15 @@ fn behind_multiplier(own_ppm: f64) -> String {
     };
     [
         "name = \"behind a port multiplier\"\nseed = 3\n".to_owned(),
-        device("M1", "CU2508", "maindevice", 23.0),
-        device("K1", "EK1100", "M1.B", own_ppm),
+        device(multiplier, "CU2508", "maindevice", ppm),
+        device("K1", "EK1100", &format!("{multiplier}.B"), own_ppm),
         device("O1", "EL4102", "K1.B", -own_ppm),
     ]
     .concat()
 }
 
-// proves: DC-13 partial: the model has a clock of its own in each network, of one speed
+// A device has the quartz of its seed and name wherever it sits: that of the port multiplier is one in all its networks.
+// proves: DC-13
 #[test]
 fn port_multiplier_is_the_reference_clock_of_each_network_behind_it() {
     let mut networks = [-30.0, 45.0].map(|ppm| {
@@ -456,6 +468,9 @@ fn port_multiplier_is_the_reference_clock_of_each_network_behind_it() {
         networks.iter_mut().for_each(|bench| bench.run_for(Span::ms(1)));
         // What follows it in one network against what follows it in the other.
         let [one, other] = &networks;
+        let quartz =
+            |bench: &Bench| bench.segment.controller(REFERENCE).unwrap().local_time(bench.now);
+        assert_eq!(quartz(one), quartz(other), "it has one clock");
         shown(one, DeviceId(2)).wrapping_sub(shown(other, DeviceId(2))) as i64
     };
     let apart: Vec<i64> = (0..10_000).map(|_| step()).collect();
@@ -464,5 +479,42 @@ fn port_multiplier_is_the_reference_clock_of_each_network_behind_it() {
     for bench in &mut networks {
         let gained = gained(bench, |bench| bench.run_for(Span::ms(1)));
         assert!((gained - 230_000).abs() < 300, "as the port multiplier: {gained} ns in 10 s");
+    }
+}
+
+// S0 L826-838. On one computer the network of the first leads the other, without a setting. On two both are led by the
+// clocks of their computers, which PTP keeps within 100 ns here.
+// proves: DC-14
+#[test]
+fn two_port_multipliers_keep_one_time_on_one_host_and_on_two() {
+    for hosts in [1, 2] {
+        let group = NetworkGroup::new();
+        let mut networks = [("M1", 23.0, 0), ("M2", -31.0, 100)].map(|(name, ppm, off)| {
+            let (epoch, group) = match hosts {
+                1 => (EPOCH, Some(group.clone())),
+                _ => (DcTime(EPOCH.0 + off), None),
+            };
+            let options = Options { clock_epoch: epoch, group, ..Options::default() };
+            let mut bench = Bench::with_options(&behind(name, ppm, -30.0), options);
+            let plan = by_project(&mut bench, |project| {
+                project.network.time_source = (hosts == 2).then_some(TimeChoice::Host);
+            });
+            assert_eq!(plan.reference_clock(), Some(REFERENCE));
+            start(&mut bench, plan);
+            bench
+        });
+        let from = networks[0].now.max(networks[1].now);
+        for bench in &mut networks {
+            bench.run_for(from.since(bench.now) + Span::s(60));
+        }
+        let mut step = || {
+            networks.iter_mut().for_each(|bench| bench.run_for(Span::ms(1)));
+            let [one, other] = &networks;
+            // The multipliers themselves, and what is behind them.
+            let apart = |id| shown(one, id).wrapping_sub(shown(other, id)) as i64;
+            apart(REFERENCE).abs().max(apart(DeviceId(2)).abs())
+        };
+        let most = (0..10_000).map(|_| step()).max().unwrap();
+        assert!(most < 500, "{hosts} hosts: {most} ns apart");
     }
 }
