@@ -10,6 +10,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
 use super::ethernet::EthernetSetup;
+use super::mailbox::FragmentsLeftOut;
 use super::signal::{SignalId, Signals};
 use super::software_fault::SoftwareFault;
 use crate::controller::{Pdi, SyncSignal};
@@ -136,6 +137,11 @@ pub trait Firmware: Debug + Send {
     /// What is at its Ethernet side, for a device that speaks EoE. False when it does not, or has no such ports.
     fn connect_ethernet(&mut self, _setup: &EthernetSetup) -> bool {
         false
+    }
+
+    /// Fragments of Ethernet frames that a fault of its software has left out; none without EoE.
+    fn fragments_left_out(&self) -> FragmentsLeftOut {
+        FragmentsLeftOut::default()
     }
 
     /// The supply is gone: outputs are no longer driven. Nothing else can be done any more.

@@ -30,7 +30,7 @@ pub enum SoftwareFault {
     LockedBuffers,
     /// A setting of it does not fit what its data say.
     Mismatch(Mismatch),
-    /// Fragments of the Ethernet frames that it sends do not leave as they should (EoE).
+    /// Fragments of Ethernet frames do not leave as they should, or do not reach its software (EoE).
     SpoilsFragments(SpoiledFragments),
     /// It has no buffer for Ethernet frames of the MainDevice, and refuses their fragments (EoE).
     EoeBufferFull,
@@ -47,9 +47,20 @@ pub enum FragmentTrouble {
     OutOfOrder,
 }
 
+/// Direction of fragments, as the device sees them.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum FragmentWay {
+    /// Those that it sends.
+    FromDevice,
+    /// Those that the MainDevice sends to it.
+    ToDevice,
+}
+
 /// Which fragments do not leave as they should.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SpoiledFragments {
+    /// The only direction that is hit; `None`: both.
+    pub way: Option<FragmentWay>,
     /// Fate of those that are hit.
     pub trouble: FragmentTrouble,
     /// Number of fragments that are hit, of 1,000,000.
@@ -166,12 +177,13 @@ impl SoftwareFaults {
         })
     }
 
-    /// What becomes of a fragment of an Ethernet frame that it sends; `None`: it leaves as it should. Each call is one
-    /// fragment: chance is drawn anew.
-    pub fn spoils_fragment(&mut self) -> Option<FragmentTrouble> {
+    /// What becomes of a fragment of an Ethernet frame that goes this way; `None`: nothing is wrong with it. Each call is
+    /// one fragment: chance is drawn anew.
+    pub fn spoils_fragment(&mut self, goes: FragmentWay) -> Option<FragmentTrouble> {
         self.0.iter_mut().find_map(|(software_fault, stream)| match software_fault {
             SoftwareFault::SpoilsFragments(spoiled) => {
-                let hit = stream.below(1_000_000) < u64::from(spoiled.share_ppm);
+                let hit = spoiled.way.is_none_or(|way| way == goes)
+                    && stream.below(1_000_000) < u64::from(spoiled.share_ppm);
                 hit.then_some(spoiled.trouble)
             }
             SoftwareFault::RefusesSdo(_)

@@ -1,4 +1,5 @@
-//! A computer or device with an IP stack: answers ARP and ping, fetches its address by DHCP, has a web page.
+//! A computer or device with an IP stack: answers ARP and ping, fetches its address by DHCP, has a web page, and asks those of
+//! others.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -13,6 +14,7 @@ use smoltcp::time::Instant as StackInstant;
 use smoltcp::wire::{EthernetAddress, HardwareAddress, IpCidr, Ipv4Cidr};
 
 use super::host_address::HostAddress;
+use super::web_client::WebClient;
 use super::web_page::WebPage;
 
 /// The longest frame that it sends, in bytes: an Ethernet header and an MTU of 1,500.
@@ -33,6 +35,9 @@ pub struct IpHost {
     dhcp: Option<SocketHandle>,
     /// There once it has had an address.
     web: Option<WebPage>,
+    client: Option<WebClient>,
+    /// Transfers that it has begun.
+    transfers: u16,
     cable: HostCable,
 }
 
@@ -63,6 +68,8 @@ impl IpHost {
             sockets,
             dhcp: None,
             web: None,
+            client: None,
+            transfers: 0,
             cable,
         };
         host.set_address(address);
@@ -117,6 +124,24 @@ impl IpHost {
         }
     }
 
+    /// Asks the web page of the host at `server` for `path` (`/`, `/bytes/N`); a transfer that was under way is given up.
+    /// [`IpHost::fetched`] tells when the answer is there.
+    pub fn fetch(&mut self, server: [u8; 4], path: &str) {
+        if let Some(former) = self.client.take() {
+            former.end(&mut self.sockets);
+        }
+        let (what, number) = ((server, path), self.transfers & 0x3FFF);
+        self.transfers = self.transfers.wrapping_add(1);
+        self.client = Some(WebClient::new(&mut self.interface, &mut self.sockets, what, number));
+    }
+
+    /// What the web page answered to [`IpHost::fetch`], without its head; `None` while it is not whole, empty where the
+    /// connection failed.
+    #[must_use]
+    pub fn fetched(&self) -> Option<&[u8]> {
+        self.client.as_ref().and_then(WebClient::body)
+    }
+
     /// Takes a frame from its cable.
     pub fn handle_frame(&mut self, frame: Vec<u8>) {
         let is_taken = self.address != HostAddress::None && self.cable.received.len() < WAITING;
@@ -136,7 +161,9 @@ impl IpHost {
             self.take_lease();
             let web = self.web.as_mut();
             let more = web.is_some_and(|web| web.serve(&mut self.sockets, &self.name));
-            if !more && before == (self.cable.received.len(), self.cable.sent.len()) {
+            let client = self.client.as_mut();
+            let asks = client.is_some_and(|client| client.serve(&mut self.sockets));
+            if !more && !asks && before == (self.cable.received.len(), self.cable.sent.len()) {
                 return;
             }
         }

@@ -9,6 +9,7 @@ mod dhcp_server;
 mod host_address;
 mod ip_host;
 mod side;
+mod web_client;
 mod web_page;
 
 pub use datagrams::{LONGEST_DATAGRAM, UdpDatagrams};

@@ -13,7 +13,16 @@ use linesman_proto::time::Instant;
 
 use super::Answers;
 use crate::device::ethernet::EthernetSide;
-use crate::device::software_fault::{FragmentTrouble, SoftwareFault, SoftwareFaults};
+use crate::device::software_fault::{FragmentTrouble, FragmentWay, SoftwareFault, SoftwareFaults};
+
+/// Fragments that a fault of the device's software has left out (`eoe-fault`).
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub struct FragmentsLeftOut {
+    /// Of those that it sends.
+    pub from_device: u64,
+    /// Of those that the MainDevice sent to it.
+    pub to_device: u64,
+}
 
 /// The port.
 #[derive(Default, Debug)]
@@ -25,6 +34,7 @@ pub(super) struct EoePort {
     fragments: VecDeque<Vec<u8>>,
     /// Number of the next frame, 0 to 15.
     number: u8,
+    left_out: FragmentsLeftOut,
 }
 
 impl EoePort {
@@ -36,7 +46,12 @@ impl EoePort {
     /// The device has started anew.
     pub(super) fn restarted(mut self) -> Self {
         self.side.iter_mut().for_each(EthernetSide::restart);
-        Self { side: self.side, ..Self::default() }
+        Self { side: self.side, left_out: self.left_out, ..Self::default() }
+    }
+
+    /// Fragments that were left out since the device was built.
+    pub(super) const fn left_out(&self) -> FragmentsLeftOut {
+        self.left_out
     }
 
     /// Does what is to be done now; says when to come again.
@@ -57,7 +72,7 @@ impl EoePort {
             let room = mailbox.saturating_sub(HEADER_LEN);
             let pieces = fragments(&frame, 0, self.number, room);
             let pieces = pieces.map(|piece| write(&Message::Fragment(piece)));
-            self.fragments = spoiled(pieces, software_faults);
+            self.fragments = spoiled(pieces, software_faults, &mut self.left_out.from_device);
             self.number = (self.number + 1) & 0x0F;
         }
         self.fragments.pop_front()
@@ -68,12 +83,18 @@ impl EoePort {
         &mut self,
         request: &[u8],
         now: Instant,
-        software_faults: &SoftwareFaults,
+        software_faults: &mut SoftwareFaults,
     ) -> Result<Answers, ErrorReplyCode> {
         match Message::parse(request) {
             Ok(Message::Fragment(_)) if software_faults.has(SoftwareFault::EoeBufferFull) => {
                 self.assembly = Assembly::default();
                 Err(ErrorReplyCode::NoMemory)
+            }
+            Ok(Message::Fragment(_))
+                if software_faults.spoils_fragment(FragmentWay::ToDevice).is_some() =>
+            {
+                self.left_out.to_device += 1;
+                Ok(Vec::new())
             }
             Ok(Message::Fragment(fragment)) => Ok(self.take(&fragment, now)),
             Ok(Message::Request { port, about, parameters }) => {
@@ -129,13 +150,14 @@ impl EoePort {
 fn spoiled(
     pieces: impl Iterator<Item = Vec<u8>>,
     software_faults: &mut SoftwareFaults,
+    left_out: &mut u64,
 ) -> VecDeque<Vec<u8>> {
     let mut leaving = VecDeque::new();
     let mut late = None;
     for piece in pieces {
         let overtaken = late.take();
-        match software_faults.spoils_fragment() {
-            Some(FragmentTrouble::Lost) => {}
+        match software_faults.spoils_fragment(FragmentWay::FromDevice) {
+            Some(FragmentTrouble::Lost) => *left_out += 1,
             Some(FragmentTrouble::OutOfOrder) if overtaken.is_none() => late = Some(piece),
             Some(FragmentTrouble::Doubled) => leaving.extend([piece.clone(), piece]),
             Some(FragmentTrouble::OutOfOrder) | None => leaving.push_back(piece),
@@ -170,7 +192,8 @@ mod tests {
     fn ask(port: &mut EoePort, message: &Message<'_>) -> Vec<Vec<u8>> {
         let mut buffer = [0; 2_000];
         let len = message.write(&mut buffer).unwrap();
-        port.answer(&buffer[..len], Instant::from_nanos(77), &SoftwareFaults::default()).unwrap()
+        port.answer(&buffer[..len], Instant::from_nanos(77), &mut SoftwareFaults::default())
+            .unwrap()
     }
 
     #[test]
@@ -193,8 +216,9 @@ mod tests {
         assert_eq!(ask(&mut port, &cut_off), [vec![0x03, 0x01, 0x01, 0x00]]);
         let filter = Message::Request { port: 0, about: Setting::SetFilter, parameters: &[] };
         assert_eq!(ask(&mut port, &filter), [vec![0x05, 0x01, 0x01, 0x04]]);
-        let err =
-            port.answer(&[0x0F, 0, 0, 0], Instant::ZERO, &SoftwareFaults::default()).unwrap_err();
+        let err = port
+            .answer(&[0x0F, 0, 0, 0], Instant::ZERO, &mut SoftwareFaults::default())
+            .unwrap_err();
         assert_eq!(err, ErrorReplyCode::InvalidHeader);
     }
 
@@ -204,9 +228,12 @@ mod tests {
         let leave = |trouble, share_ppm| {
             let mut faults = SoftwareFaults::default();
             let seed = Seed(3);
-            let spoils = SpoiledFragments { trouble, share_ppm, seed };
+            let spoils = SpoiledFragments { way: None, trouble, share_ppm, seed };
             faults.begin(SoftwareFault::SpoilsFragments(spoils));
-            spoiled(pieces(), &mut faults).into_iter().flatten().collect::<Vec<u8>>()
+            let mut left_out = 0;
+            let left = spoiled(pieces(), &mut faults, &mut left_out);
+            assert_eq!(left_out, 6_u64.saturating_sub(left.len() as u64));
+            left.into_iter().flatten().collect::<Vec<u8>>()
         };
         let all = 1_000_000;
         assert_eq!(leave(FragmentTrouble::Lost, 0), [0, 1, 2, 3, 4, 5]);
@@ -218,7 +245,7 @@ mod tests {
         let piece = fragments(&[0x55; 60], 0, 0, 132).next().unwrap();
         let mut buffer = [0; 200];
         let len = Message::Fragment(piece).write(&mut buffer).unwrap();
-        let refused = EoePort::default().answer(&buffer[..len], Instant::ZERO, &faults);
+        let refused = EoePort::default().answer(&buffer[..len], Instant::ZERO, &mut faults);
         assert_eq!(refused, Err(ErrorReplyCode::NoMemory));
     }
 

@@ -24,6 +24,7 @@ use linesman_proto::time::{Instant, Span};
 
 use self::coe::CoeServer;
 use self::eoe::EoePort;
+pub use self::eoe::FragmentsLeftOut;
 use self::foe::FoeServer;
 pub use self::object_server::ObjectServer;
 use self::outbox::{Envelope, Outbox};
@@ -102,6 +103,12 @@ impl Mailbox {
     /// Frames of EoE go there from now on.
     pub fn connect(&mut self, side: EthernetSide) {
         self.eoe.connect(side);
+    }
+
+    /// Fragments of Ethernet frames that were left out by a fault.
+    #[must_use]
+    pub const fn fragments_left_out(&self) -> FragmentsLeftOut {
+        self.eoe.left_out()
     }
 
     /// The next message has this counter: the device sent others before.

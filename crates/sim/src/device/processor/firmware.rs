@@ -12,7 +12,7 @@ use crate::device::application_layer::{ApplicationLayer, Refusal};
 use crate::device::ethernet::{EthernetFunction, EthernetSetup, EthernetSide, HostAddress};
 use crate::device::firmware::{Firmware, SampleAgain};
 use crate::device::history::History;
-use crate::device::mailbox::Served;
+use crate::device::mailbox::{FragmentsLeftOut, Served};
 use crate::device::signal::Signals;
 use crate::device::software_fault::SoftwareFault;
 
@@ -131,6 +131,10 @@ impl Firmware for Processor {
             self.mailbox.connect(EthernetSide::new(function, setup));
         }
         speaks && fits
+    }
+
+    fn fragments_left_out(&self) -> FragmentsLeftOut {
+        self.mailbox.fragments_left_out()
     }
 
     fn read_sii(&mut self) {
