@@ -73,8 +73,10 @@ struct EthernetPlanRate {
     message_ns: u64,
     /// What limits it: `cycle`, `bandwidth`, or `subdevice`, which is taken to need 600 µs for a message.
     limit: &'static str,
-    /// Data of a TCP connection.
+    /// Data in TCP segments, while nothing goes the other way.
     bytes_per_second: u64,
+    /// The same with an acknowledgement of every second segment; `null` to a SubDevice.
+    tcp_bytes_per_second: Option<u64>,
 }
 
 /// What one of those involved has to do.
@@ -115,6 +117,7 @@ impl EthernetPlanArguments {
                             RateLimit::SubDevice => "subdevice",
                         },
                         bytes_per_second: rate.bytes_per_second,
+                        tcp_bytes_per_second: rate.tcp_bytes_per_second(),
                     },
                 )
             };
@@ -176,6 +179,7 @@ pub(super) fn text(report: &EthernetPlanReport, output: &Output) -> String {
                 "a message",
                 "limit",
                 "bytes/s",
+                "with TCP",
             ],
             output.paint(),
         );
@@ -193,12 +197,13 @@ pub(super) fn text(report: &EthernetPlanReport, output: &Output) -> String {
                     time(rate.message_ns),
                     rate.limit.to_owned(),
                     grouped(rate.bytes_per_second),
+                    rate.tcp_bytes_per_second.map_or_else(|| "-".to_owned(), grouped),
                 ]);
             }
         }
         text.push_str(&table.render());
         text.push_str(
-            "Data of one TCP connection, one mailbox message each way in each cycle; fragments of a frame of 1,514 bytes.\n",
+            "Data in frames of 1,514 bytes while nothing goes the other way; with TCP: every second one is acknowledged.\n",
         );
     }
     if !report.routes.is_empty() {
