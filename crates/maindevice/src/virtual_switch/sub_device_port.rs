@@ -11,9 +11,18 @@ pub struct FragmentCounts {
     pub fragments: u64,
     /// Frames that came whole.
     pub frames: u64,
-    /// Frames of which a fragment is missing, came twice, out of its order, or not in its place.
+    /// Frames of which a fragment is missing, came twice, out of its order, or not in its place; and frames of which none
+    /// came, by their numbers.
     pub lost: u64,
 }
+
+/// Frames in a row that are numbered one after the other before a number that is left out counts as a frame lost:
+/// not every SubDevice numbers its frames.
+const NUMBERED: u8 = 4;
+/// Numbers of frames, from 0 on.
+const NUMBERS: u8 = 16;
+/// The most frames that are taken to be missing between two; more look like a SubDevice that begins anew.
+const MOST_MISSING: u8 = NUMBERS / 2;
 
 /// A SubDevice as the switch sees it: fragments of its Ethernet ports, and the numbers of frames to it.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -23,6 +32,10 @@ pub struct SubDevicePort {
     /// The frame that was lost last, by port and number: the rest of its fragments is no further loss.
     lost: Option<(u8, u8)>,
     counts: FragmentCounts,
+    /// Port and number of the latest frame of which something came.
+    latest: Option<(u8, u8)>,
+    /// How many frames in a row had the number behind the one before, up to [`NUMBERED`].
+    in_row: u8,
     next_number: u8,
 }
 
@@ -32,6 +45,7 @@ impl SubDevicePort {
     pub fn handle_message(&mut self, data: &[u8]) -> Option<Vec<u8>> {
         let Ok(Message::Fragment(fragment)) = Message::parse(data) else { return None };
         self.counts.fragments += 1;
+        self.note_number(fragment.port, fragment.frame & (NUMBERS - 1));
         let is_first = matches!(fragment.place, FragmentPlace::First { .. });
         let assembly = self.assemblies.entry(fragment.port).or_default();
         if is_first {
@@ -50,6 +64,24 @@ impl SubDevicePort {
                 }
                 None
             }
+        }
+    }
+
+    /// Counts frames of which no fragment came. One whose number is 0 may be the first of a SubDevice that begins anew.
+    fn note_number(&mut self, port: u8, number: u8) {
+        let Some((former_port, former)) = self.latest.replace((port, number)) else { return };
+        if (former_port, former) == (port, number) {
+            return;
+        }
+        let missing = number.wrapping_sub(former + 1) & (NUMBERS - 1);
+        if former_port != port || missing > MOST_MISSING {
+            self.in_row = 0;
+        } else if missing == 0 {
+            self.in_row = (self.in_row + 1).min(NUMBERED);
+        } else if number != 0 && self.in_row == NUMBERED {
+            self.counts.lost += u64::from(missing);
+        } else {
+            self.in_row = 0;
         }
     }
 
@@ -112,6 +144,23 @@ mod tests {
         assert_eq!(take(&mut port, &swapped), 0);
         assert_eq!((port.counts().frames, port.counts().lost), (2, 4));
         assert_eq!(take(&mut port, &messages(&frame, 9)), 1);
+    }
+
+    #[test]
+    fn frames_of_which_nothing_came_are_counted_by_their_numbers() {
+        let lost = |numbers: &[u8]| {
+            let mut port = SubDevicePort::default();
+            for number in numbers {
+                port.handle_message(&messages(&[7; 60], *number)[0]);
+            }
+            port.counts().lost
+        };
+        assert_eq!(lost(&[3, 4, 5, 6, 7, 8]), 0);
+        assert_eq!(lost(&[13, 14, 15, 0, 1, 3, 4, 7]), 3);
+        assert_eq!(lost(&[12, 13, 14, 15, 0, 2, 3, 2, 3]), 1, "no frame is lost backwards");
+        assert_eq!(lost(&[5; 20]), 0, "it numbers none");
+        assert_eq!(lost(&[1, 5, 2, 9, 3, 11, 7, 8, 10, 12]), 0, "nor does this one");
+        assert_eq!(lost(&[3, 4, 5, 6, 7, 8, 0, 1]), 0, "it may have begun anew");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod described;
 mod ethernet;
 #[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod ethernet_rate;
+mod ethernet_tcp;
 mod hot_connect;
 mod hot_connect_ports;
 mod identity;
