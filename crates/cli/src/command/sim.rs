@@ -11,6 +11,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_runtime::control::{Control, ControlSocketWatch};
 use linesman_runtime::part::guard;
 use linesman_runtime::selector::Selector;
+use linesman_runtime::serve::ethernet_ports::EthernetPorts;
 use linesman_runtime::serve::lateness::LatenessReport;
 use linesman_runtime::serve::report::Status as SimStatus;
 use linesman_runtime::serve::{ServeControls, Server};
@@ -53,9 +54,22 @@ pub(crate) struct Arguments {
     /// Write down what really happens: a line of JSON for each event, in a new file
     #[arg(long, value_name = "FILE")]
     log: Vec<PathBuf>,
+    /// Lead an Ethernet port of a switch terminal to a network interface that is made, and removed at the end: S4.1=port1; of
+    /// one segment only
+    #[arg(long, value_name = "TERMINAL.PORT=INTERFACE", value_parser = ethernet_port)]
+    ethernet_port: Vec<(String, String)>,
     /// At the end one JSON object per segment on a line, schema linesman.sim/1; nothing else
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A port and the interface it leads to.
+fn ethernet_port(text: &str) -> Result<(String, String), String> {
+    let halves = text.rsplit_once('=').filter(|(port, name)| !port.is_empty() && !name.is_empty());
+    halves.map(|(port, name)| (port.to_owned(), name.to_owned())).ok_or_else(|| {
+        "expected a port of a switch terminal and the interface it leads to, such as S4.1=port1"
+            .to_owned()
+    })
 }
 
 /// A segment that is ready to run.
@@ -74,7 +88,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         let control = arguments.control.get(index).map(PathBuf::as_path);
         let log = arguments.log.get(index).map(PathBuf::as_path);
         let shown = (!arguments.json).then_some(&mut *output);
-        ready.push(prepare(file, names, control, log, &stop, shown)?);
+        let ports = arguments.ethernet_port.as_slice();
+        ready.push(prepare(file, names, control, log, ports, &stop, shown)?);
     }
     if !arguments.json {
         output.line("Ctrl-C ends it.");
@@ -104,6 +119,10 @@ fn cards(arguments: &Arguments) -> Result<Vec<Vec<String>>, Failure> {
         );
         Failure::new(reason, advice)
     };
+    if segments.len() > 1 && !arguments.ethernet_port.is_empty() {
+        let reason = "--ethernet-port: expected one segment".to_owned();
+        return Err(Failure::new(reason, "start each segment by a `linesman sim` of its own"));
+    }
     if segments.len() != on.len() {
         let (files, cards) = (count(segments.len() as u64, "segment"), on.len());
         return Err(refuse(format!("{files}, but --on {cards} times: expected as many")));
@@ -146,10 +165,11 @@ fn prepare(
     names: &[String],
     control: Option<&Path>,
     log: Option<&Path>,
+    ports: &[(String, String)],
     stop: &Stop,
     shown: Option<&mut Output>,
 ) -> Result<Ready, Failure> {
-    let plant = Plant::open(file)?;
+    let mut plant = Plant::open(file)?;
     let drawing: Vec<_> = drawing::draw(plant.segment.tree(), &labels(&plant));
     let wiring = Wiring::of(&plant.segment, &plant.project);
     let said = described(&plant, &wiring, names);
@@ -162,7 +182,12 @@ fn prepare(
         })?;
         beside.truth_writer = Some(truth_writer);
     }
-    let server = Server::open(plant.segment, wiring, names)?;
+    let mut bridges = EthernetPorts::default();
+    for (port, interface) in ports {
+        let opened = bridges.open(&mut plant.segment, port, interface);
+        opened.map_err(|error| Failure::from_error(&error))?;
+    }
+    let server = Server::open(plant.segment, wiring, names)?.with_ethernet_ports(bridges);
     stop.wakes(&server.wake_handle())
         .map_err(|error| Failure::new(format!("listening for Ctrl-C: {error}"), ""))?;
     if let Some(output) = shown {

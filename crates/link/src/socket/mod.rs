@@ -20,5 +20,5 @@ pub use listener::{ListenFilter, Listener};
 pub use raw::{RawSocket, Reception, Sent, SocketOptions};
 pub use receiver::SocketCounters;
 pub use tap::{TapError, TapInterface};
-pub use wait::{Ready, Waitable, wait_any, wait_for};
+pub use wait::{Ready, Waitable, wait_among, wait_any, wait_for};
 pub use wake::{WakeHandle, Waker};

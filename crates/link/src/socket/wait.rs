@@ -62,6 +62,24 @@ pub fn wait_any<const N: usize>(
     wait_for(sockets, left)
 }
 
+/// The same for as many sockets as there are, which takes memory each time.
+///
+/// # Errors
+/// When the kernel refuses to wait.
+pub fn wait_among(
+    sockets: &[&dyn Waitable],
+    clock: &HostClock,
+    deadline: Instant,
+) -> Result<Ready, LinkError> {
+    let waited: Vec<_> = sockets.iter().map(|socket| socket.polled()).collect();
+    let mut polled: Vec<_> =
+        waited.iter().map(|one| PollFd::from_borrowed_fd(one.socket, PollFlags::IN)).collect();
+    let left = (deadline != Instant::MAX).then(|| timespec(deadline.since(clock.now()).as_nanos()));
+    ended(poll(&mut polled, left.as_ref()), || {
+        waited.iter().map(|one| one.name).collect::<Vec<_>>().join("+")
+    })
+}
+
 /// The same for who has just read the clock: waits so long at most; `None` waits without end.
 ///
 /// # Errors
@@ -75,13 +93,18 @@ pub fn wait_for<const N: usize>(
         PollFd::from_borrowed_fd(waited[index].socket, PollFlags::IN)
     });
     let left = left.map(|left| timespec(left.as_nanos()));
-    match poll(&mut polled, left.as_ref()) {
+    ended(poll(&mut polled, left.as_ref()), || waited.map(|one| one.name).join("+"))
+}
+
+/// How a wait for the interfaces of these names ended.
+fn ended(
+    polled: rustix::io::Result<usize>,
+    names: impl FnOnce() -> String,
+) -> Result<Ready, LinkError> {
+    match polled {
         Ok(0) => Ok(Ready::Deadline),
         Ok(_) => Ok(Ready::Readable),
         Err(Errno::INTR) => Ok(Ready::Interrupted),
-        Err(error) => {
-            let names = waited.map(|one| one.name).join("+");
-            Err(LinkError::system(&names, "waiting for frames", error))
-        }
+        Err(error) => Err(LinkError::system(&names(), "waiting for frames", error)),
     }
 }

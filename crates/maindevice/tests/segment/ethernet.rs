@@ -359,3 +359,60 @@ fn frames_arrive_whole_though_ethercat_frames_are_lost() {
     assert!(came >= 34, "{came} of 40");
     assert!(office.repetitions > 0);
 }
+
+// S0 L2883-2886.
+// proves: EOE-05 (S)
+#[test]
+fn two_devices_at_an_el6614_that_are_outside_the_segment_are_each_reached_by_its_own_port() {
+    let mut office = Office::new(&plant(STACK, PLUGGED, ""), SwitchLimits::default());
+    let segment = &mut office.bench.segment;
+    let id = segment.open_ethernet_port("S4.1").expect("a port of an EL6614").0;
+    segment.open_ethernet_port("S4.3").expect("another one");
+    for place in ["S4.1", "S4.5", "S4", "S4.x", "S1.1", "W1.1", "K1.1", "S9.1", ""] {
+        assert!(segment.open_ethernet_port(place).is_err(), "{place}");
+    }
+    let macs = [[2, 1, 1, 1, 1, 1], [2, 3, 3, 3, 3, 3]];
+    let from = |port: usize, to: [u8; 6]| {
+        let mut frame = [&to[..], &macs[port], &[0x88, 0xB5]].concat();
+        frame.resize(200, port as u8);
+        frame
+    };
+    let left = |office: &mut Office| {
+        let mut frames = Vec::new();
+        while let Some(frame) = office.bench.segment.poll_ethernet_frame(id) {
+            frames.push(frame);
+        }
+        frames
+    };
+    let put = |office: &mut Office, port: u8, frame: &[u8]| {
+        let now = office.bench.now;
+        office.bench.segment.handle_ethernet_frame(now, id, port, frame);
+        office.run(Span::ms(100));
+    };
+    // To all: the other port, and the network.
+    for (at, (port, other)) in [(1, 3), (3, 1)].into_iter().enumerate() {
+        let frame = from(at, ALL);
+        office.came.clear();
+        put(&mut office, port, &frame);
+        assert_eq!(left(&mut office), [(other, frame.clone())]);
+        assert_eq!(office.came, [frame]);
+    }
+    // To one of them: by its port alone; an address that nobody knows is looked for at both.
+    for (at, port) in [(0, 1), (1, 3)] {
+        let frame = ethernet(macs[at], 0x88B5, &[7; 400]);
+        office.send(frame.clone());
+        office.run(Span::ms(100));
+        assert_eq!(left(&mut office), [(port, frame)]);
+    }
+    office.send(ethernet([2, 5, 5, 5, 5, 5], 0x88B5, &[7; 400]));
+    office.run(Span::ms(100));
+    assert_eq!(left(&mut office).iter().map(|(port, _)| *port).collect::<Vec<_>>(), [1, 3]);
+    // From one to the other: it stays at the terminal. What comes by no open port goes nowhere.
+    office.came.clear();
+    let frame = from(0, macs[1]);
+    put(&mut office, 1, &frame);
+    assert_eq!(left(&mut office), [(3, frame)]);
+    put(&mut office, 2, &from(0, ALL));
+    assert_eq!((left(&mut office), &office.came), (Vec::new(), &Vec::<Vec<u8>>::new()));
+    assert!(office.ping(DEVICE_IP, 100), "others are not concerned");
+}

@@ -10,6 +10,7 @@
 //! wish to stop; it looks at nothing by the clock but once a second, so that what happens in the
 //! segment by itself is not made up for all at once.
 
+pub mod ethernet_ports;
 pub mod lateness;
 pub mod report;
 
@@ -18,12 +19,14 @@ use linesman_link::error::LinkError;
 use linesman_link::interface::CardLock;
 use linesman_link::real_time::sched_fifo;
 use linesman_link::socket::{
-    Batch, RawSocket, Ready, Reception, SocketOptions, Waitable, WakeHandle, Waker, wait_any,
+    Batch, RawSocket, Ready, Reception, SocketOptions, Waitable, WakeHandle, Waker, wait_among,
+    wait_any,
 };
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 use linesman_sim::segment::Segment;
 
+use self::ethernet_ports::EthernetPorts;
 use self::lateness::Lateness;
 use self::report::{Frames, Host, SCHEMA, Status};
 use crate::control::{Control, apply};
@@ -48,6 +51,7 @@ pub struct Server {
     segment: Segment,
     wiring: Wiring,
     cards: Vec<RawSocket>,
+    ethernet_ports: EthernetPorts,
     waker: Waker,
     batch: Batch,
     answer: Vec<u8>,
@@ -100,6 +104,7 @@ impl Server {
         })?;
         Ok(Self {
             cards: cards?,
+            ethernet_ports: EthernetPorts::default(),
             waker,
             clock: HostClock::start(),
             segment,
@@ -109,6 +114,13 @@ impl Server {
             tally: ServeCounts::default(),
             _locks: locks,
         })
+    }
+
+    /// Ethernet ports of the segment carry what comes by interfaces of this computer from now on.
+    #[must_use]
+    pub fn with_ethernet_ports(mut self, ports: EthernetPorts) -> Self {
+        self.ethernet_ports = ports;
+        self
     }
 
     /// What wakes it: to look at the wish to stop, or at what is asked for.
@@ -151,6 +163,10 @@ impl Server {
                 }
             }
             self.wiring.carry(self.segment.signals_mut());
+            let carried = self.ethernet_ports.carry(now, &mut self.segment)?;
+            if carried > 0 {
+                nap = nap.min(SOON);
+            }
             let sent = self.send(now)?;
             self.tell(&mut beside.truth_writer);
             if stop.is_set() || now >= until {
@@ -223,6 +239,12 @@ impl Server {
         let before = self.clock.now();
         let waker = &self.waker;
         let _: Ready = match self.cards.as_slice() {
+            _ if !self.ethernet_ports.is_empty() => {
+                let cards = self.cards.iter().map(|card| card as &dyn Waitable);
+                let all =
+                    cards.chain(self.ethernet_ports.waitable()).chain([waker as &dyn Waitable]);
+                wait_among(&all.collect::<Vec<_>>(), &self.clock, deadline)?
+            }
             [a, b, ..] => wait_any([a as &dyn Waitable, b, waker], &self.clock, deadline)?,
             [a] => wait_any([a as &dyn Waitable, waker], &self.clock, deadline)?,
             [] => wait_any([waker as &dyn Waitable], &self.clock, deadline)?,

@@ -68,6 +68,21 @@ impl Controller {
         self.reschedule();
     }
 
+    /// A frame comes from outside the segment to an Ethernet port of the device, at `at`.
+    pub fn handle_ethernet_frame(&mut self, at: Instant, port: u8, frame: Vec<u8>) {
+        let Some(side) = self.firmware.ethernet_mut() else { return };
+        side.handle_outside(port, frame);
+        if self.powered {
+            self.core.call_firmware(at);
+            self.reschedule();
+        }
+    }
+
+    /// The next frame that leaves the segment by an Ethernet port of the device, and by which port.
+    pub fn poll_ethernet_frame(&mut self) -> Option<(u8, Vec<u8>)> {
+        self.firmware.ethernet_mut()?.poll_outside()
+    }
+
     /// Whether a watchdog ran out since they were taken last.
     #[must_use]
     pub fn has_watchdog_expiries(&self) -> bool {

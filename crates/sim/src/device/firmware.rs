@@ -9,7 +9,7 @@ use linesman_proto::mailbox::coe::{Emergency, ObjectAddress};
 use linesman_proto::time::{Instant, Span};
 
 use super::application_layer::Refusal;
-use super::ethernet::EthernetSetup;
+use super::ethernet::{EthernetSetup, EthernetSide};
 use super::mailbox::FragmentsLeftOut;
 use super::signal::{SignalId, Signals};
 use super::software_fault::SoftwareFault;
@@ -137,6 +137,17 @@ pub trait Firmware: Debug + Send {
     /// What is at its Ethernet side, for a device that speaks EoE. False when it does not, or has no such ports.
     fn connect_ethernet(&mut self, _setup: &EthernetSetup) -> bool {
         false
+    }
+
+    /// Its Ethernet side; `None` where there is none.
+    fn ethernet(&self) -> Option<&EthernetSide> {
+        None
+    }
+
+    /// The same, to open ports of it and to hand frames to them. Frames go through
+    /// [`Controller::handle_ethernet_frame`](crate::controller::Controller::handle_ethernet_frame).
+    fn ethernet_mut(&mut self) -> Option<&mut EthernetSide> {
+        None
     }
 
     /// Fragments of Ethernet frames that a fault of its software has left out; none without EoE.

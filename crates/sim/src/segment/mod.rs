@@ -30,6 +30,7 @@ pub use bridge::BridgedSides;
 pub use build::BuildError;
 pub use capture_probe::{ProbeFrame, ProbePlaceError};
 pub use card::{FrameTally, HostPort};
+pub use ethernet::EthernetPortError;
 pub use plug::PlugError;
 pub use tx_capture::Outgoing;
 

@@ -4,6 +4,7 @@
 //! the network of the MainDevice. Any other device has a web page. The IP stack is smoltcp, which takes bytes and time as
 //! arguments as everything here does.
 
+mod bridged_port;
 mod datagrams;
 mod dhcp_server;
 mod host_address;

@@ -6,6 +6,7 @@ use linesman_proto::ethernet::MacAddress;
 use linesman_proto::mailbox::eoe::IpParameters;
 use linesman_proto::time::Instant;
 
+use super::bridged_port::BridgedPort;
 use super::datagrams::{DatagramSource, UdpDatagrams};
 use super::dhcp_server::DhcpServer;
 use super::host_address::HostAddress;
@@ -47,6 +48,15 @@ pub struct EthernetSetup {
     pub hosts: Vec<PluggedHost>,
 }
 
+/// A port, by what is there.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum PortIndex {
+    /// This one of the computers of the segment.
+    Host(usize),
+    /// This one of the ports that lead out of it.
+    Bridged(usize),
+}
+
 /// The Ethernet side of a device.
 #[derive(Debug)]
 pub struct EthernetSide {
@@ -55,6 +65,10 @@ pub struct EthernetSide {
     own: Option<(IpHost, HostAddress)>,
     datagrams: Option<DatagramSource>,
     hosts: Vec<IpHost>,
+    /// Ports of it, from 1, at which no computer of the segment is.
+    free: Vec<u8>,
+    /// Ports whose cables lead out of the segment.
+    bridged: Vec<BridgedPort>,
     dhcp: DhcpServer,
     /// Frames to the MainDevice.
     sent: VecDeque<Vec<u8>>,
@@ -74,12 +88,19 @@ impl EthernetSide {
             mac.0[5] = mac.0[5].wrapping_add(at);
             IpHost::new(&format!("{name}, port {}", host.port), mac, host.address)
         };
+        let ports = match function {
+            EthernetFunction::SwitchPorts(ports) => 1..=ports,
+            EthernetFunction::IpApplication => 1..=0,
+        };
+        let free = ports.filter(|port| hosts.iter().all(|host| host.port != *port)).collect();
         let hosts = (1..).zip(hosts).map(plugged).collect();
         Self {
             mac: *mac,
             own,
             datagrams: datagrams.map(DatagramSource::new),
             hosts,
+            free,
+            bridged: Vec::new(),
             dhcp: DhcpServer::default(),
             sent: VecDeque::new(),
         }
@@ -88,6 +109,7 @@ impl EthernetSide {
     /// The device has started anew: what the MainDevice had set is forgotten, the computers at its ports stay.
     pub fn restart(&mut self) {
         self.sent.clear();
+        self.bridged.iter_mut().for_each(BridgedPort::clear);
         self.dhcp.set(IpParameters::default());
         if let Some((own, address)) = &mut self.own {
             own.set_address(*address);
@@ -103,13 +125,69 @@ impl EthernetSide {
         }
     }
 
+    /// The cable of a port leads out of the segment from now on. False when there is no such port, or when a computer of the
+    /// segment is plugged in there.
+    pub fn bridge(&mut self, port: u8) -> bool {
+        let Some(at) = self.free.iter().position(|free| *free == port) else { return false };
+        self.free.remove(at);
+        self.bridged.push(BridgedPort::new(port));
+        true
+    }
+
+    /// Takes a frame that comes from outside to a port.
+    pub fn handle_outside(&mut self, port: u8, frame: Vec<u8>) {
+        if let Some(bridged) = self.bridged.iter_mut().find(|bridged| bridged.number() == port) {
+            bridged.receive(frame);
+        }
+    }
+
+    /// True if a frame waits to leave by a port.
+    pub fn has_outside(&self) -> bool {
+        self.bridged.iter().any(BridgedPort::has_frame)
+    }
+
+    /// The next frame that leaves by a port, and by which.
+    pub fn poll_outside(&mut self) -> Option<(u8, Vec<u8>)> {
+        let mut ports = self.bridged.iter_mut();
+        ports.find_map(|port| Some((port.number(), port.poll_transmit()?)))
+    }
+
     /// Takes a frame of the MainDevice.
     pub fn handle_frame(&mut self, frame: &[u8]) {
-        for host in self.own.iter_mut().map(|(own, _)| own).chain(&mut self.hosts) {
-            if is_for(frame, host.mac()) {
+        if let Some((own, _)) = &mut self.own
+            && is_for(frame, own.mac())
+        {
+            own.handle_frame(frame.to_vec());
+        }
+        if !self.deliver(None, frame) {
+            // Nobody knows where that is.
+            self.bridged.iter_mut().for_each(|port| port.send(frame));
+        }
+    }
+
+    /// Hands a frame to those behind the ports for whom it is, but not where it came from. True if that was all: it was for
+    /// one of them.
+    fn deliver(&mut self, from: Option<PortIndex>, frame: &[u8]) -> bool {
+        let mut found = false;
+        for (at, host) in self.hosts.iter_mut().enumerate() {
+            if from != Some(PortIndex::Host(at)) && is_for(frame, host.mac()) {
                 host.handle_frame(frame.to_vec());
+                found |= !is_group(frame);
             }
         }
+        for (at, port) in self.bridged.iter_mut().enumerate() {
+            let is_known = frame
+                .first_chunk::<6>()
+                .is_some_and(|to| !is_group(frame) && port.knows(MacAddress(*to)));
+            if is_known && from == Some(PortIndex::Bridged(at)) {
+                // It has had it already.
+                found = true;
+            } else if is_known || is_group(frame) && from != Some(PortIndex::Bridged(at)) {
+                port.send(frame);
+                found |= is_known;
+            }
+        }
+        found || is_group(frame) && from.is_none()
     }
 
     /// Does what is to be done now.
@@ -125,26 +203,23 @@ impl EthernetSide {
                 push(&mut self.sent, frame);
             }
         }
-        let mut within = Vec::new();
+        let mut came = Vec::new();
         for (at, host) in self.hosts.iter_mut().enumerate() {
             host.handle_timeout(now);
-            while let Some(frame) = host.poll_transmit() {
-                match self.dhcp.answer(self.mac, &frame) {
-                    Some(answer) => within.push((None, answer)),
-                    None => within.push((Some(at), frame)),
-                }
-            }
+            came.extend(std::iter::from_fn(|| Some((PortIndex::Host(at), host.poll_transmit()?))));
         }
-        for (from, frame) in within {
-            let mut only_here = from.is_none();
-            for (at, host) in self.hosts.iter_mut().enumerate() {
-                if Some(at) != from && is_for(&frame, host.mac()) {
-                    host.handle_frame(frame.clone());
-                    only_here |= !is_group(&frame);
+        for (at, port) in self.bridged.iter_mut().enumerate() {
+            let frames = std::iter::from_fn(|| port.poll_received());
+            came.extend(frames.map(|frame| (PortIndex::Bridged(at), frame)));
+        }
+        for (from, frame) in came {
+            match self.dhcp.answer(self.mac, &frame) {
+                // It is for one at a port, and for nobody in the network.
+                Some(answer) => {
+                    self.deliver(None, &answer);
                 }
-            }
-            if !only_here {
-                push(&mut self.sent, frame);
+                None if self.deliver(Some(from), &frame) => {}
+                None => push(&mut self.sent, frame),
             }
         }
     }

@@ -49,6 +49,16 @@ impl EoePort {
         Self { side: self.side, left_out: self.left_out, ..Self::default() }
     }
 
+    /// Where frames go.
+    pub(super) const fn side(&self) -> Option<&EthernetSide> {
+        self.side.as_ref()
+    }
+
+    /// The same, to hand frames to its ports.
+    pub(super) const fn side_mut(&mut self) -> Option<&mut EthernetSide> {
+        self.side.as_mut()
+    }
+
     /// Fragments that were left out since the device was built.
     pub(super) const fn left_out(&self) -> FragmentsLeftOut {
         self.left_out

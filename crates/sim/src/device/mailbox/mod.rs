@@ -105,6 +105,17 @@ impl Mailbox {
         self.eoe.connect(side);
     }
 
+    /// Where frames of EoE go; `None`: nowhere.
+    #[must_use]
+    pub const fn ethernet(&self) -> Option<&EthernetSide> {
+        self.eoe.side()
+    }
+
+    /// The same, to hand frames to its ports.
+    pub const fn ethernet_mut(&mut self) -> Option<&mut EthernetSide> {
+        self.eoe.side_mut()
+    }
+
     /// Fragments of Ethernet frames that were left out by a fault.
     #[must_use]
     pub const fn fragments_left_out(&self) -> FragmentsLeftOut {

@@ -133,6 +133,14 @@ impl Firmware for Processor {
         speaks && fits
     }
 
+    fn ethernet(&self) -> Option<&EthernetSide> {
+        self.mailbox.ethernet()
+    }
+
+    fn ethernet_mut(&mut self) -> Option<&mut EthernetSide> {
+        self.mailbox.ethernet_mut()
+    }
+
     fn fragments_left_out(&self) -> FragmentsLeftOut {
         self.mailbox.fragments_left_out()
     }
