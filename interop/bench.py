@@ -127,14 +127,14 @@ class Bench:
 class Segment:
     """A virtual segment on the far end; use it in `with`."""
 
-    def __init__(self, bench, linesman, file, on=FAR):
-        self.bench, self.linesman, self.file, self.on = bench, linesman, file, on
+    def __init__(self, bench, linesman, file, on=FAR, options=()):
+        self.bench, self.linesman, self.file, self.on, self.options = bench, linesman, file, on, options
         self.near = NEAR if on == FAR else f"{NEAR}+{NEAR_B}"
         self.socket = bench.path("control")
 
     def __enter__(self):
         self.process = self.bench.start(
-            self.bench.far, self.linesman, "sim", self.file, "--on", self.on, "--control", self.socket,
+            self.bench.far, self.linesman, "sim", self.file, "--on", self.on, "--control", self.socket, *self.options,
         )
         end_at = time.monotonic() + 20
         while time.monotonic() < end_at:

@@ -15,6 +15,7 @@ const PROGRAMS: &[(&str, &str, &str)] = &[
     ("ethtool", "--version", "ethtool"),
     ("jq", "--version", "jq"),
     ("nft", "--version", "nftables"),
+    ("iperf3", "--version", "iperf3"),
     ("python3", "--version", "python3"),
 ];
 
