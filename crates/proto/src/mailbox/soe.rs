@@ -17,6 +17,21 @@ const DRIVE_AT: u32 = 5;
 /// The element "value" of an IDN.
 pub const VALUE: u8 = 0x40;
 
+/// IDN S-0-0017: the list of all IDNs of the drive.
+pub const ALL_NUMBERS: Idn = Idn(17);
+/// Bytes in front of a list: the length of it now, and the most it can have.
+const LIST_HEADER_LEN: usize = 4;
+
+/// IDNs of a list, such as the value of [`ALL_NUMBERS`]; `None` where it is shorter than it says.
+///
+/// Reference: IEC 61800-7-204, data of variable length: two lengths in bytes, two bytes each, then the elements.
+#[must_use]
+pub fn numbers_of_list(value: &[u8]) -> Option<Vec<Idn>> {
+    let ([low, high, _, _], list) = value.split_first_chunk::<LIST_HEADER_LEN>()?;
+    let list = list.get(..usize::from(u16::from_le_bytes([*low, *high])))?;
+    Some(list.as_chunks().0.iter().map(|number| Idn(u16::from_le_bytes(*number))).collect())
+}
+
 /// What is asked or answered.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Operation {
@@ -229,6 +244,15 @@ mod tests {
         assert_eq!(refused.refusal(), Some(SoeError(0x7004)));
         assert_eq!(refused.refusal().unwrap().to_string(), "0x7004 it cannot be changed");
         assert_eq!(Message::parse(&[1, 2, 3]), None);
+    }
+
+    #[test]
+    fn list_of_numbers_is_as_long_as_it_says() {
+        let list = [4, 0, 8, 0, 17, 0, 1, 0x80, 9, 9];
+        assert_eq!(numbers_of_list(&list), Some(vec![ALL_NUMBERS, Idn(0x8001)]));
+        assert_eq!(numbers_of_list(&list[..7]), None);
+        assert_eq!(numbers_of_list(&[0, 0, 0]), None);
+        assert_eq!(numbers_of_list(&[0, 0, 0, 0]), Some(Vec::new()));
     }
 
     #[test]
