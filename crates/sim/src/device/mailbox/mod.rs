@@ -16,7 +16,7 @@ use std::collections::VecDeque;
 
 use linesman_proto::mailbox::coe::{Emergency, Message as CoeMessage};
 use linesman_proto::mailbox::{
-    Counter, ErrorReply, ErrorReplyCode, Header, MailboxError, MailboxType, Message,
+    Counter, ErrorReply, ErrorReplyCode, HEADER_LEN, Header, MailboxError, MailboxType, Message,
 };
 use linesman_proto::sii::Protocols;
 use linesman_proto::state::AlState;
@@ -240,7 +240,7 @@ impl Mailbox {
                 self.eoe.answer(message.data, now, served.software_faults)
             }
             MailboxType::Soe if !boots && self.protocols.has(Protocols::SOE) => {
-                Ok(soe::answer(message.data).into_iter().collect())
+                Ok(soe::answer(message.data, answer_room(pdi).saturating_sub(HEADER_LEN)))
             }
             // Nobody answers an error with an error.
             MailboxType::Error => return,
