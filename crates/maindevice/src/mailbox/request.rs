@@ -63,6 +63,16 @@ pub enum MailboxRequest {
         /// The frame without check sequence, 14 to 1,518 bytes.
         frame: Vec<u8>,
     },
+    /// Read an identification number by SoE: the data of its elements. The list of all that a drive has is the value of
+    /// [`ALL_NUMBERS`](linesman_proto::mailbox::soe::ALL_NUMBERS).
+    ReadIdn {
+        /// Which drive of the SubDevice, 0 to 7.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+        /// Which of its elements; 0x40 is its value, 0x02 its name.
+        elements: u8,
+    },
     /// Write an identification number by SoE: nothing comes back.
     WriteIdn {
         /// Which drive of the SubDevice.
@@ -115,6 +125,7 @@ impl MailboxRequest {
             | Self::DescribeEntry { .. }
             | Self::SetAddresses { .. }
             | Self::SendFrame { .. }
+            | Self::ReadIdn { .. }
             | Self::WriteIdn { .. }
             | Self::ReadFile { .. }
             | Self::WriteFile { .. } => None,
@@ -144,6 +155,9 @@ impl MailboxRequest {
             }
             Self::SetAddresses { port, .. } => MailboxOperation::SetAddresses { port: *port },
             Self::SendFrame { frame, .. } => MailboxOperation::SendFrame { len: frame.len() },
+            Self::ReadIdn { drive, idn, .. } => {
+                MailboxOperation::ReadIdn { drive: *drive, idn: *idn }
+            }
             Self::WriteIdn { drive, idn, .. } => {
                 MailboxOperation::WriteIdn { drive: *drive, idn: *idn }
             }
@@ -196,6 +210,13 @@ pub enum MailboxOperation {
         /// How many bytes it has.
         len: usize,
     },
+    /// Reading an identification number of a drive.
+    ReadIdn {
+        /// Which drive.
+        drive: u8,
+        /// Which number.
+        idn: Idn,
+    },
     /// Writing an identification number of a drive.
     WriteIdn {
         /// Which drive.
@@ -231,7 +252,7 @@ impl MailboxOperation {
             | Self::DescribeObject { .. }
             | Self::DescribeEntry { .. } => MailboxType::Coe,
             Self::SetAddresses { .. } | Self::SendFrame { .. } => MailboxType::Eoe,
-            Self::WriteIdn { .. } => MailboxType::Soe,
+            Self::ReadIdn { .. } | Self::WriteIdn { .. } => MailboxType::Soe,
             Self::ReadFile { .. } | Self::WriteFile { .. } => MailboxType::Foe,
             Self::Pass { protocol } => *protocol,
         }
@@ -255,6 +276,7 @@ impl fmt::Display for MailboxOperation {
                 write!(f, "setting the addresses of Ethernet port {port}")
             }
             Self::SendFrame { len } => write!(f, "sending an Ethernet frame of {len} bytes"),
+            Self::ReadIdn { drive, idn } => write!(f, "reading {idn} of drive {drive}"),
             Self::WriteIdn { drive, idn } => write!(f, "writing {idn} of drive {drive}"),
             Self::ReadFile { name } => write!(f, "reading file `{name}`"),
             Self::WriteFile { name } => write!(f, "writing file `{name}`"),

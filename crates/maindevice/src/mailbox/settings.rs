@@ -1,11 +1,11 @@
 //! Settings that are brought by other protocols than CoE: addresses of an Ethernet port (EoE), identification
-//! numbers of a drive (SoE).
+//! numbers of a drive (SoE), which are read, too.
 //!
-//! Reference: ETG.1000.6, EoE (set IP parameter) and SoE (write request).
+//! Reference: ETG.1000.6, EoE (set IP parameter) and SoE (read request, write request).
 
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::eoe::{self, EoeResult, Setting};
-use linesman_proto::mailbox::soe::{self, Operation, SOE_HEADER_LEN};
+use linesman_proto::mailbox::soe::{self, Idn, Operation, SOE_HEADER_LEN};
 
 use super::failure::{Step, Why};
 use super::transaction::MailboxTransaction;
@@ -28,6 +28,61 @@ pub(crate) async fn set_addresses(
             let found = format!("{other:?}");
             Err(Why::Protocol { expected: "the answer to new addresses", found })
         }
+    }
+}
+
+/// The most that an element has: two lengths of two bytes, and as many bytes as they can tell.
+const LONGEST_ELEMENT: usize = 4 + 0xFFFF;
+/// Elements of an IDN.
+const ELEMENTS: usize = 8;
+
+/// Reads elements of an IDN, which come in as many messages as it takes.
+pub(crate) async fn read_idn(
+    transaction: &mut MailboxTransaction<'_>,
+    drive: u8,
+    elements: u8,
+    idn: Idn,
+) -> Result<Vec<u8>, Why> {
+    let request = soe::Message {
+        operation: Operation::ReadRequest,
+        incomplete: false,
+        error: false,
+        drive,
+        elements,
+        number: idn.0,
+        data: &[],
+    };
+    transaction.say(MailboxType::Soe, |body| request.write(body)).await?;
+    let expected = "the answer to a read request";
+    let mut data = Vec::new();
+    let mut count = 0;
+    loop {
+        let answer = transaction.hear(MailboxType::Soe).await?;
+        let Some(message) = soe::Message::parse(&answer) else {
+            return Err(Why::Protocol { expected, found: format!("{} bytes", answer.len()) });
+        };
+        if message.operation != Operation::ReadResponse || message.drive != drive {
+            let found = format!("{:?} of drive {}", message.operation, message.drive);
+            return Err(Why::Protocol { expected, found });
+        }
+        if let Some(code) = message.refusal() {
+            return Err(Why::Drive { code });
+        }
+        data.extend_from_slice(message.data);
+        if data.len() > LONGEST_ELEMENT * ELEMENTS {
+            let found = format!("{} bytes and more", data.len());
+            return Err(Why::Protocol { expected: "elements of 64 KiB each at most", found });
+        }
+        if !message.incomplete {
+            let found = Idn(message.number);
+            return match found == idn {
+                true => Ok(data),
+                false => Err(Why::Protocol { expected, found: format!("that of {found}") }),
+            };
+        }
+        count += 1;
+        transaction.step = Step::Fragment(count);
+        transaction.wait_anew();
     }
 }
 

@@ -27,6 +27,7 @@ use crate::executor::Executor;
 use crate::options::Options;
 use crate::supervisor::DeviceTable;
 
+mod drive_numbers;
 mod fragments;
 
 const ID: DeviceId = DeviceId(4);
@@ -54,7 +55,7 @@ enum Said {
 /// A mailbox of 32 bytes each way: 16 bytes of SDO data in a first message, 23 in a segment.
 fn device() -> DevicePlan {
     let areas = MailboxPair::from_words([OUT, 32, IN, 32]);
-    let protocols = Protocols(Protocols::COE | Protocols::EOE | Protocols::FOE);
+    let protocols = Protocols(Protocols::COE | Protocols::EOE | Protocols::FOE | Protocols::SOE);
     DevicePlan {
         name: "5".to_owned(),
         station: StationAddress(0x1005),

@@ -77,6 +77,9 @@ impl MailboxTransaction<'_> {
             MailboxRequest::SendFrame { port, number, frame } => {
                 ethernet::send_frame(self, *port, *number, frame).await
             }
+            MailboxRequest::ReadIdn { drive, idn, elements } => {
+                settings::read_idn(self, *drive, *elements, *idn).await
+            }
             MailboxRequest::WriteIdn { drive, idn, elements, data } => {
                 let written = settings::write_idn(self, *drive, *elements, idn.0, data).await;
                 written.map(|()| Vec::new())

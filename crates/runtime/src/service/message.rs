@@ -82,6 +82,8 @@ pub enum Asked {
     SetAddresses { port: u8, data: String },
     /// Send an Ethernet frame by EoE.
     SendFrame { port: u8, number: u8, data: String },
+    /// Read elements of an identification number by SoE.
+    ReadIdn { drive: u8, idn: u16, elements: u8 },
     /// Write an identification number by SoE.
     WriteIdn { drive: u8, idn: u16, elements: u8, data: String },
     /// Fetch a file.
@@ -274,6 +276,9 @@ impl From<&MailboxRequest> for Asked {
             MailboxRequest::SendFrame { port, number, frame } => {
                 Self::SendFrame { port: *port, number: *number, data: to_hex(frame) }
             }
+            MailboxRequest::ReadIdn { drive, idn, elements } => {
+                Self::ReadIdn { drive: *drive, idn: idn.0, elements: *elements }
+            }
             MailboxRequest::WriteIdn { drive, idn, elements, data } => {
                 let (drive, idn, elements) = (*drive, idn.0, *elements);
                 Self::WriteIdn { drive, idn, elements, data: to_hex(data) }
@@ -326,6 +331,10 @@ impl Asked {
             Self::SendFrame { port, number, data } => {
                 let frame = from_hex(&data)?;
                 Service::Mailbox(MailboxRequest::SendFrame { port, number, frame })
+            }
+            Self::ReadIdn { drive, idn, elements } => {
+                let idn = Idn(idn);
+                Service::Mailbox(MailboxRequest::ReadIdn { drive, idn, elements })
             }
             Self::WriteIdn { drive, idn, elements, data } => {
                 let (idn, data) = (Idn(idn), from_hex(&data)?);
