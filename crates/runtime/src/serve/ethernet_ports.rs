@@ -71,6 +71,9 @@ impl EthernetPorts {
 
     /// Carries frames both ways; gives how many came from the interfaces.
     pub(super) fn carry(&self, now: Instant, segment: &mut Segment) -> Result<usize, LinkError> {
+        if self.0.is_empty() {
+            return Ok(0);
+        }
         let mut came = 0;
         let mut buffer = [0; BUFFER];
         for PortBridge { device, port, tap } in &self.0 {
