@@ -43,6 +43,7 @@ impl MacAddress {
 
     /// The address with [`SOURCE_MARK`] set, as a controller returns it.
     #[must_use]
+    #[inline]
     pub const fn marked(self) -> Self {
         let mut bytes = self.0;
         bytes[0] |= SOURCE_MARK;
@@ -51,6 +52,7 @@ impl MacAddress {
 
     /// Whether [`SOURCE_MARK`] is set.
     #[must_use]
+    #[inline]
     pub const fn is_marked(self) -> bool {
         self.0[0] & SOURCE_MARK != 0
     }
@@ -123,12 +125,14 @@ fn read_be(frame: &[u8], at: usize) -> Option<u16> {
 
 /// The source address, when the frame is long enough to have one.
 #[must_use]
+#[inline]
 pub fn source(frame: &[u8]) -> Option<MacAddress> {
     frame.get(6..12)?.try_into().ok().map(MacAddress)
 }
 
 /// The destination address, when the frame is long enough to have one.
 #[must_use]
+#[inline]
 pub fn destination(frame: &[u8]) -> Option<MacAddress> {
     frame.get(0..6)?.try_into().ok().map(MacAddress)
 }

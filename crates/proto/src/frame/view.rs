@@ -73,6 +73,7 @@ impl<'a> FrameView<'a> {
     /// # Errors
     /// [`FrameError`] when there are none; what the datagrams themselves look like is left to
     /// [`FrameView::datagrams`].
+    #[inline]
     pub fn parse(frame: &'a [u8]) -> Result<Self, FrameError> {
         let len = frame.len();
         let (wrapping, header_at) =
@@ -89,18 +90,21 @@ impl<'a> FrameView<'a> {
         }
     }
 
+    #[inline]
     fn header(&self) -> Option<u16> {
         read_u16(self.frame, self.header_at)
     }
 
     /// Source address.
     #[must_use]
+    #[inline]
     pub fn source(&self) -> MacAddress {
         ethernet::source(self.frame).unwrap_or_default()
     }
 
     /// Destination address.
     #[must_use]
+    #[inline]
     pub fn destination(&self) -> MacAddress {
         ethernet::destination(self.frame).unwrap_or_default()
     }
@@ -120,6 +124,7 @@ impl<'a> FrameView<'a> {
 
     /// The datagrams, first to last.
     #[must_use]
+    #[inline]
     pub fn datagrams(&self) -> Datagrams<'a> {
         Datagrams::new(self.frame, self.header_at + ETHERCAT_HEADER_LEN)
     }
@@ -152,6 +157,7 @@ pub struct CutHeader {
 impl<'a> Datagrams<'a> {
     /// Walks the datagrams of `frame` whose first header lies at offset `first_at`.
     #[must_use]
+    #[inline]
     pub const fn new(frame: &'a [u8], first_at: usize) -> Self {
         Self { frame, next_at: Some(first_at), number: 0, cut_at: None }
     }
@@ -165,25 +171,32 @@ impl<'a> Datagrams<'a> {
         Some(CutHeader { code, index, address, len: u16::from_le_bytes([low, high]) & 0x07FF })
     }
 
+    #[inline]
     fn read(&mut self, at: usize) -> Result<Datagram<'a>, DatagramError> {
-        let number = self.number;
-        let left = self.frame.len().saturating_sub(at);
-        self.cut_at = Some(at);
-        if left < DATAGRAM_OVERHEAD {
-            let needed = DATAGRAM_OVERHEAD;
-            return Err(DatagramError::HeaderCutOff { number, needed, left });
+        let bytes = self.frame.get(at..).unwrap_or_default();
+        if bytes.len() < DATAGRAM_OVERHEAD {
+            return Err(self.cut_off(at));
         }
-        let bytes = &self.frame[at..];
         let datagram = Datagram { bytes, at };
-        let announced = datagram.data_len();
-        let left = left - DATAGRAM_OVERHEAD;
-        if announced > left {
-            return Err(DatagramError::DataCutOff { number, announced, left });
-        }
-        self.cut_at = None;
-        let len = announced + DATAGRAM_OVERHEAD;
+        let len = datagram.data_len() + DATAGRAM_OVERHEAD;
+        let Some(bytes) = bytes.get(..len) else { return Err(self.cut_off(at)) };
         self.next_at = datagram.more_follow().then_some(at + len);
-        Ok(Datagram { bytes: &bytes[..len], at })
+        Ok(Datagram { bytes, at })
+    }
+
+    /// Ends the walk at a datagram that is not there as a whole.
+    #[cold]
+    fn cut_off(&mut self, at: usize) -> DatagramError {
+        self.cut_at = Some(at);
+        let (number, needed) = (self.number, DATAGRAM_OVERHEAD);
+        let bytes = self.frame.get(at..).unwrap_or_default();
+        match bytes.len().checked_sub(needed) {
+            None => DatagramError::HeaderCutOff { number, needed, left: bytes.len() },
+            Some(left) => {
+                let announced = Datagram { bytes, at }.data_len();
+                DatagramError::DataCutOff { number, announced, left }
+            }
+        }
     }
 }
 
@@ -221,47 +234,55 @@ impl<'a> Datagram<'a> {
 
     /// Command code as sent; [`Datagram::command`] gives its meaning.
     #[must_use]
+    #[inline]
     pub fn code(&self) -> u8 {
         self.bytes[0]
     }
 
     /// The command, when the code is not reserved.
     #[must_use]
+    #[inline]
     pub fn command(&self) -> Option<Command> {
         Command::from_code(self.code())
     }
 
     /// The index byte: the MainDevice's own mark, which no controller changes.
     #[must_use]
+    #[inline]
     pub fn index(&self) -> u8 {
         self.bytes[1]
     }
 
     /// ADP: position or station address, depending on the command.
     #[must_use]
+    #[inline]
     pub fn adp(&self) -> u16 {
         u16::from_le_bytes([self.bytes[2], self.bytes[3]])
     }
 
     /// ADO: the offset in the controller's memory.
     #[must_use]
+    #[inline]
     pub fn ado(&self) -> RegisterAddress {
         RegisterAddress(u16::from_le_bytes([self.bytes[4], self.bytes[5]]))
     }
 
     /// The 32-bit logical address, for LRD, LWR and LRW.
     #[must_use]
+    #[inline]
     pub fn logical(&self) -> LogicalAddress {
         let b = self.bytes;
         LogicalAddress(u32::from_le_bytes([b[2], b[3], b[4], b[5]]))
     }
 
+    #[inline]
     fn len_word(&self) -> u16 {
         u16::from_le_bytes([self.bytes[6], self.bytes[7]])
     }
 
     /// Length of the data in bytes, 0..=2047.
     #[must_use]
+    #[inline]
     pub fn data_len(&self) -> usize {
         usize::from(self.len_word() & 0x07FF)
     }
@@ -275,30 +296,35 @@ impl<'a> Datagram<'a> {
 
     /// Whether another datagram follows.
     #[must_use]
+    #[inline]
     pub fn more_follow(&self) -> bool {
         self.len_word() & 0x8000 != 0
     }
 
     /// The interrupt field: every controller ORs its unmasked ECAT events into it.
     #[must_use]
+    #[inline]
     pub fn irq(&self) -> u16 {
         u16::from_le_bytes([self.bytes[8], self.bytes[9]])
     }
 
     /// The data.
     #[must_use]
+    #[inline]
     pub fn data(&self) -> &'a [u8] {
         &self.bytes[DATAGRAM_HEADER_LEN..self.bytes.len() - WKC_LEN]
     }
 
     /// The working counter.
     #[must_use]
+    #[inline]
     pub fn wkc(&self) -> WorkingCounter {
         let at = self.bytes.len() - WKC_LEN;
         WorkingCounter(u16::from_le_bytes([self.bytes[at], self.bytes[at + 1]]))
     }
 }
 
+#[inline]
 fn read_u16(bytes: &[u8], at: usize) -> Option<u16> {
     Some(u16::from_le_bytes([*bytes.get(at)?, *bytes.get(at + 1)?]))
 }

@@ -118,6 +118,7 @@ pub struct AlStatus(pub u16);
 impl AlStatus {
     /// The status of a SubDevice in a state, without error.
     #[must_use]
+    #[inline]
     pub const fn new(state: AlState) -> Self {
         Self(state.bits() as u16)
     }
@@ -142,6 +143,7 @@ impl AlStatus {
 
     /// The state. Of broadcast data use [`AlState::from_or`] instead.
     #[must_use]
+    #[inline]
     pub const fn state(self) -> StateValue {
         StateValue::from_bits(self.0 as u8)
     }
@@ -149,6 +151,7 @@ impl AlStatus {
     /// Whether a request was refused or the SubDevice left its state on its own; then the AL status
     /// code says why.
     #[must_use]
+    #[inline]
     pub const fn error(self) -> bool {
         self.0 & FLAG_4 != 0
     }

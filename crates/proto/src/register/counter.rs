@@ -23,6 +23,7 @@ impl Difference {
     /// Where several counters are cleared together, as those of all ports are, the others give it
     /// away; [`ErrorCounters::since`](super::ErrorCounters::since) makes use of that.
     #[must_use]
+    #[inline]
     pub const fn between(before: u8, after: u8) -> Self {
         match after.checked_sub(before) {
             Some(rise) => Self { rise: rise as u64, saturated: after == u8::MAX, cleared: false },
@@ -32,6 +33,7 @@ impl Difference {
 
     /// What a reading tells when the counter is known to have been cleared since the last one.
     #[must_use]
+    #[inline]
     pub const fn since_clear(after: u8) -> Self {
         Self { rise: after as u64, saturated: after == u8::MAX, cleared: true }
     }
@@ -47,6 +49,7 @@ impl Difference {
 
     /// Whether the rise is exact: no counts can have been lost at 255 or by a clear.
     #[must_use]
+    #[inline]
     pub const fn is_exact(&self) -> bool {
         !self.saturated && !self.cleared
     }
@@ -63,6 +66,7 @@ pub struct Total {
 
 impl Total {
     /// Takes a reading. `None` for the first one, which is history and adds nothing.
+    #[inline]
     pub fn record(&mut self, reading: u8) -> Option<Difference> {
         let before = self.last.replace(reading.into())?;
         let before = u8::try_from(before).unwrap_or(u8::MAX);
@@ -115,10 +119,12 @@ impl Total {
 
     /// The last reading.
     #[must_use]
+    #[inline]
     pub const fn last(&self) -> Option<u64> {
         self.last
     }
 
+    #[inline]
     fn add(&mut self, difference: Difference) -> Difference {
         self.rise = self.rise.saturating_add(difference.rise);
         self.clears += u32::from(difference.cleared);

@@ -105,6 +105,7 @@ impl ErrorCounter {
 
     /// The counters that a write clears together with this one.
     #[must_use]
+    #[inline]
     pub const fn clear_group(self) -> ClearGroup {
         match self {
             Self::InvalidFrame(_) | Self::PhysicalLayer(_) | Self::Forwarded(_) => ClearGroup::Rx,
@@ -127,6 +128,18 @@ impl ErrorCounter {
         }
     }
 }
+
+/// The counter at each byte of the block; none at the PDI error code.
+const AT_OFFSET: [Option<ErrorCounter>; ErrorCounters::LEN] = {
+    let mut counters = [None; ErrorCounters::LEN];
+    let mut index = 0;
+    while index < ErrorCounter::ALL.len() {
+        let counter = ErrorCounter::ALL[index];
+        counters[(counter.address().0 - ErrorCounters::START.0) as usize] = Some(counter);
+        index += 1;
+    }
+    counters
+};
 
 impl fmt::Display for ErrorCounter {
     /// `invalid frames, port B`, `PDI errors`.
@@ -217,13 +230,26 @@ impl ErrorCounters {
         counters
     }
 
+    /// The counters that `data`, read from `start` on, cover, in order of addresses: those of
+    /// [`from_bytes`](Self::from_bytes).
+    #[inline]
+    pub fn covered(
+        data: &[u8],
+        start: RegisterAddress,
+    ) -> impl Iterator<Item = (ErrorCounter, u8)> + Clone + '_ {
+        // What lies before the block is passed over, and so is what lies behind it.
+        let before = usize::from(Self::START.0.saturating_sub(start.0));
+        let first = usize::from(start.0.saturating_sub(Self::START.0));
+        let data = data.get(before..).unwrap_or_default();
+        let counters = AT_OFFSET.get(first..).unwrap_or_default();
+        counters.iter().zip(data).filter_map(|(counter, value)| Some(((*counter)?, *value)))
+    }
+
     /// Takes over the counters that `data`, read from `start` on, cover, and keeps the others.
     pub fn update(&mut self, data: &[u8], start: RegisterAddress) {
         let byte = |address: u16| data.get(usize::from(address.checked_sub(start.0)?)).copied();
-        for counter in ErrorCounter::ALL {
-            if let Some(value) = byte(counter.address().0) {
-                *self.slot(counter) = Some(value);
-            }
+        for (counter, value) in Self::covered(data, start) {
+            *self.slot(counter) = Some(value);
         }
         let code = table::PDI_ERROR_CODE.address.0;
         if let (Some(low), Some(high)) = (byte(code), byte(code + 1)) {
@@ -246,6 +272,7 @@ impl ErrorCounters {
 
     /// The value of a counter, if it was read.
     #[must_use]
+    #[inline]
     pub fn value(&self, counter: ErrorCounter) -> Option<u8> {
         match counter {
             ErrorCounter::InvalidFrame(port) => self.invalid_frame[port],
@@ -258,6 +285,7 @@ impl ErrorCounters {
     }
 
     /// The place of a counter's value.
+    #[inline]
     pub fn slot(&mut self, counter: ErrorCounter) -> &mut Option<u8> {
         match counter {
             ErrorCounter::InvalidFrame(port) => &mut self.invalid_frame[port],
@@ -280,7 +308,8 @@ impl ErrorCounters {
     }
 
     /// The counters that were read, in order of addresses.
-    pub fn iter(&self) -> impl Iterator<Item = (ErrorCounter, u8)> {
+    #[inline]
+    pub fn iter(&self) -> impl Iterator<Item = (ErrorCounter, u8)> + Clone {
         ErrorCounter::ALL
             .into_iter()
             .filter_map(|counter| self.value(counter).map(|value| (counter, value)))
@@ -466,6 +495,8 @@ mod tests {
             data in proptest::collection::vec(any::<u8>(), 0..40),
         ) {
             let counters = ErrorCounters::from_bytes(&data, RegisterAddress(start));
+            let covered = ErrorCounters::covered(&data, RegisterAddress(start));
+            prop_assert!(covered.eq(counters.iter()));
             for counter in ErrorCounter::ALL {
                 let expected = counter
                     .address()

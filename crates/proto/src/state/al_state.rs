@@ -114,6 +114,7 @@ pub enum StateValue {
 impl StateValue {
     /// The value in the low four bits of `bits`; the others are ignored.
     #[must_use]
+    #[inline]
     pub const fn from_bits(bits: u8) -> Self {
         match bits & 0x0F {
             1 => Self::Known(AlState::Init),
@@ -127,6 +128,7 @@ impl StateValue {
 
     /// The value for the four-bit field.
     #[must_use]
+    #[inline]
     pub const fn bits(self) -> u8 {
         match self {
             Self::Known(state) => state.bits(),
@@ -136,6 +138,7 @@ impl StateValue {
 
     /// The state, if the value names one.
     #[must_use]
+    #[inline]
     pub const fn state(self) -> Option<AlState> {
         match self {
             Self::Known(state) => Some(state),
@@ -171,6 +174,7 @@ impl OredStates {
 
     /// Whether at least one of them signals an error (bit 4).
     #[must_use]
+    #[inline]
     pub const fn any_error(self) -> bool {
         self.0 & 0x10 != 0
     }
@@ -179,6 +183,7 @@ impl OredStates {
     ///
     /// A controller that answers 0, which is no state, does not show in the sum.
     #[must_use]
+    #[inline]
     pub const fn all_in(self) -> Option<AlState> {
         match self.0 & 0x0F {
             1 => Some(AlState::Init),
@@ -210,8 +215,15 @@ impl OredStates {
     /// `None` when there is none: for 0, and for 3, which is BOOT, or INIT with PREOP. Reading the
     /// controllers one by one settles it.
     #[must_use]
-    pub fn highest(self) -> Option<AlState> {
-        AlState::ALL.into_iter().rev().find(|state| self.certain(*state))
+    #[inline]
+    pub const fn highest(self) -> Option<AlState> {
+        match self.0 & 0x0F {
+            8.. => Some(AlState::Op),
+            4.. => Some(AlState::SafeOp),
+            2 => Some(AlState::PreOp),
+            1 => Some(AlState::Init),
+            _ => None,
+        }
     }
 }
 
