@@ -25,6 +25,12 @@ const TELLING: [(RegisterAddress, u16); 4] = [
     (RegisterAddress(0x0310), 4),
 ];
 
+/// Where the last of them ends.
+const TELLING_END: u16 = {
+    let (register, len) = TELLING[TELLING.len() - 1];
+    register.0 + len
+};
+
 /// Habits of those who send requests on one line.
 #[derive(Clone, Default, Debug)]
 pub struct Habits {
@@ -189,7 +195,7 @@ impl SenderHabits {
     fn note_trait(&mut self, command: Command, datagram: &Datagram<'_>, is_request: bool) {
         let (ado, len) = (datagram.ado().0, datagram.data_len());
         let effect = command.effect();
-        if effect.reads && !effect.writes {
+        if effect.reads && !effect.writes && ado < TELLING_END {
             let end = ado.saturating_add(len as u16);
             for ((register, len), read) in TELLING.iter().zip(&mut self.telling_read) {
                 *read |= ado < register.0 + len && register.0 < end;

@@ -109,6 +109,8 @@ impl Poll {
 #[derive(Clone, Default, Debug)]
 pub(super) struct Polls {
     all: Vec<Poll>,
+    /// Index of the one that was accessed last: many are accessed of one SubDevice after the other.
+    latest: usize,
 }
 
 impl Polls {
@@ -122,10 +124,12 @@ impl Polls {
         // Broadcasts may come with any position, as one that passes a second card of a ring.
         let address =
             if command.effect().addressing == Addressing::Broadcast { 0 } else { datagram.adp() };
-        let is_it = |poll: &&mut Poll| {
-            poll.register == register && poll.len == len && poll.access == access
-        };
-        if let Some(poll) = self.all.iter_mut().find(is_it) {
+        let is_it =
+            |poll: &Poll| poll.register == register && poll.len == len && poll.access == access;
+        if !self.all.get(self.latest).is_some_and(is_it) {
+            self.latest = self.all.iter().position(is_it).unwrap_or(self.all.len());
+        }
+        if let Some(poll) = self.all.get_mut(self.latest) {
             if poll.address == address && at >= poll.last {
                 poll.again(at);
             }

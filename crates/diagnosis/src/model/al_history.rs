@@ -360,6 +360,7 @@ impl AlHistory {
 
     /// Whether it signals an error now.
     #[must_use]
+    #[inline]
     pub fn has_error(&self) -> bool {
         self.errors.back().is_some_and(|error| error.ended.is_none())
     }
@@ -398,8 +399,16 @@ impl AlHistory {
         true
     }
 
+    /// True if this state was read last.
+    #[must_use]
+    #[inline]
+    pub fn is_in(&self, state: AlState) -> bool {
+        self.status.is_some_and(|status| status.value.0 & 0x0F == u16::from(state.bits()))
+    }
+
     /// The state, where one was read and it names one.
     #[must_use]
+    #[inline]
     pub fn state(&self) -> Option<AlState> {
         self.status?.value.state().state()
     }

@@ -133,7 +133,7 @@ impl CounterHistory {
         at: Instant,
         frame: Option<u64>,
     ) -> bool {
-        self.record_counters(&ErrorCounters::from_bytes(data, start), at, frame)
+        self.record_all(ErrorCounters::covered(data, start), at, frame)
     }
 
     /// Takes a reading of some counters. Says whether any of them rose or fell, or is new.
@@ -145,13 +145,22 @@ impl CounterHistory {
         at: Instant,
         frame: Option<u64>,
     ) -> bool {
+        self.record_all(reading.iter(), at, frame)
+    }
+
+    fn record_all(
+        &mut self,
+        reading: impl Iterator<Item = (ErrorCounter, u8)> + Clone,
+        at: Instant,
+        frame: Option<u64>,
+    ) -> bool {
         let mut fell = [false; ClearGroup::ALL.len()];
         // A write takes effect when the frame has passed and its check sequence was right: readings behind it in the same
         // frame show what was before.
         let is_old = |history: &Self, counter: ErrorCounter| {
             frame.is_some() && history.cleared_in[counter.clear_group() as usize] == frame
         };
-        for (counter, value) in reading.iter() {
+        for (counter, value) in reading.clone() {
             if is_old(self, counter) {
                 continue;
             }
@@ -159,12 +168,19 @@ impl CounterHistory {
         }
         self.clears += fell.iter().filter(|fell| **fell).count() as u32;
         let mut news = false;
-        for (counter, value) in reading.iter() {
+        for (counter, value) in reading {
             if is_old(self, counter) {
                 continue;
             }
             let group = counter.clear_group() as usize;
             let track = self.track_of(counter, value.into(), at, frame, &mut news);
+            if !fell[group] && track.stands_at(value) {
+                track.last = Seen::new(value.into(), at, frame);
+                if track.last_rise().is_some_and(|rise| rise.at == at) {
+                    self.last_rise = Some(at);
+                }
+                continue;
+            }
             let difference = match fell[group] {
                 true => track.total.record_after_clear(value),
                 false => track.total.record(value),
@@ -203,6 +219,7 @@ impl CounterHistory {
     }
 
     /// Notes which group was cleared, where a counter fell.
+    #[inline]
     fn note_fall(
         &mut self,
         counter: ErrorCounter,
@@ -225,6 +242,7 @@ impl CounterHistory {
         }
     }
 
+    #[inline]
     fn track_of(
         &mut self,
         counter: ErrorCounter,
@@ -371,6 +389,15 @@ impl CounterHistory {
 }
 
 impl CounterTrack {
+    /// True if a reading of this value is the one before once more, and adds nothing. One at the end of the counter may
+    /// hide some.
+    #[inline]
+    fn stands_at(&self, value: u8) -> bool {
+        let value = u64::from(value);
+        value < END && self.last.value == value && self.total.last() == Some(value)
+    }
+
+    #[inline]
     fn record(
         &mut self,
         value: u64,

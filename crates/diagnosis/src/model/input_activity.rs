@@ -14,6 +14,8 @@ const LOOK_EVERY: u64 = 1_024;
 const FLIPS: u32 = 64;
 /// … if one frame in so many had one.
 const ONE_IN: u64 = 20;
+/// Bytes that are compared at once: most stand still.
+const WORD: usize = 8;
 /// A sign of life stands still when it was missed so many times …
 const MISSED: u64 = 30;
 /// … and for so long.
@@ -38,6 +40,29 @@ struct ByteActivity {
     last: u64,
     /// When the latest change came, in which frame.
     seen: Option<Seen<()>>,
+}
+
+impl ByteActivity {
+    /// Some bits have changed in a frame.
+    #[inline]
+    fn record(&mut self, flipped: u8, frame: u64, seen: Seen<()>) {
+        if self.changes == 0 {
+            self.first = frame;
+        }
+        self.changes = self.changes.saturating_add(1);
+        self.flipped |= flipped;
+        self.last = frame;
+        self.seen = Some(seen);
+    }
+}
+
+/// Up to eight bytes as a number, the first one lowest.
+#[inline]
+fn word(bytes: &[u8]) -> u64 {
+    if let Some(whole) = bytes.first_chunk() {
+        return u64::from_le_bytes(*whole);
+    }
+    bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte))
 }
 
 /// A sign of life of a SubDevice.
@@ -71,20 +96,25 @@ impl InputActivity {
         if self.last == back {
             return is_time;
         }
-        let changed = self.last.iter_mut().zip(back).zip(&mut self.bytes).zip(sent);
-        for (((last, back), motion), sent) in changed {
+        let seen = Seen::new((), at, Some(frame));
+        let (frames, len) = (self.frames, sent.len().min(back.len()));
+        let (sent, back) = (&sent[..len], &back[..len]);
+        let words = self.last[..len].chunks(WORD).zip(back.chunks(WORD)).zip(sent.chunks(WORD));
+        for (((last, back), sent), motions) in words.zip(self.bytes.chunks_mut(WORD)) {
+            let (last, back, sent) = (word(last), word(back), word(sent));
+            let mut changed = last ^ back;
             // What came back as it went out is an output, or nobody's.
-            if *last != *back && back != sent {
-                if motion.changes == 0 {
-                    motion.first = self.frames;
+            let inputs = back ^ sent;
+            while changed != 0 {
+                let bit = changed.trailing_zeros() & !7;
+                let (flipped, is_input) = ((changed >> bit) as u8, (inputs >> bit) as u8 != 0);
+                changed &= !(0xFF << bit);
+                if is_input && let Some(motion) = motions.get_mut(bit as usize / 8) {
+                    motion.record(flipped, frames, seen);
                 }
-                motion.changes = motion.changes.saturating_add(1);
-                motion.flipped |= *last ^ *back;
-                motion.last = self.frames;
-                motion.seen = Some(Seen::new((), at, Some(frame)));
             }
-            *last = *back;
         }
+        self.last[..len].copy_from_slice(back);
         is_time
     }
 

@@ -4,6 +4,7 @@
 //! behind, there and back. A host adds what it likes to single frames, so only the fastest of many are compared, and the
 //! doubt is how far those differ among themselves.
 
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, VecDeque};
 
 use linesman_proto::time::{Instant, Span};
@@ -76,10 +77,12 @@ impl PathDelayStep {
 impl PathDelays {
     /// A frame of `len` bytes that was sent at `sent` took so many ns.
     pub fn record(&mut self, len: usize, took: u64, sent: Instant) {
-        if self.by_len.len() >= LENGTHS && !self.by_len.contains_key(&len) {
-            return;
-        }
-        let way = self.by_len.entry(len).or_default();
+        let is_full = self.by_len.len() >= LENGTHS;
+        let way = match self.by_len.entry(len) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(_) if is_full => return,
+            Entry::Vacant(new) => new.insert(PathDelay::default()),
+        };
         if way.count == 0 {
             (way.from, way.shortest) = (sent, took);
         }

@@ -5,6 +5,7 @@
 //! way out or in.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
@@ -189,12 +190,14 @@ impl RoundTripTimes {
     ) -> bool {
         let took = back.since(leaves).as_nanos();
         self.path_delays.record(len, took, sent);
-        if self.usual.len() >= LENGTHS && !self.usual.contains_key(&len) {
-            return false;
-        }
         let least = LEAST.max(self.worst_learnt * WORST);
         let is_calm = self.late_count == 0 || self.in_time >= CALM;
-        let usual = self.usual.entry(len).or_default();
+        let is_full = self.usual.len() >= LENGTHS;
+        let usual = match self.usual.entry(len) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(_) if is_full => return false,
+            Entry::Vacant(new) => new.insert(LengthTimes::default()),
+        };
         let compared = usual.take(took, least, is_calm);
         match compared {
             Some((longer, _)) => {

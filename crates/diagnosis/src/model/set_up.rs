@@ -126,7 +126,9 @@ fn whole_sync_managers(
     start: RegisterAddress,
     data: &[u8],
 ) -> impl Iterator<Item = (u8, [u8; SyncManagerConfig::LEN])> + '_ {
-    (0..16_u8).filter_map(move |number| {
+    // Many poll a single byte of them, which is none as a whole.
+    let numbers = if data.len() < SyncManagerConfig::LEN { 0..0 } else { 0..16_u8 };
+    numbers.filter_map(move |number| {
         let address = SYNC_MANAGERS.start + u16::from(number) * SyncManagerConfig::LEN as u16;
         Some((number, bytes_at(data, start, address)?))
     })

@@ -67,7 +67,8 @@ impl Fingerprint {
             if print.datagrams == 0 {
                 print.first_index = datagram.index();
             }
-            let is_position = datagram.command().is_some_and(|command| {
+            let command = datagram.command();
+            let is_position = command.is_some_and(|command| {
                 matches!(command.addressing(), Addressing::Position | Addressing::Broadcast)
             });
             let address = u64::from(datagram.logical().0);
@@ -78,7 +79,7 @@ impl Fingerprint {
                 u64::from(without_handing(datagram.code(), datagram.logical().0)) << 56 | tail;
             let wkc = u64::from(datagram.wkc().0);
             print.skeleton = mix(print.skeleton, tail | address);
-            print.commands += u32::from(datagram.command() != Some(Command::Nop));
+            print.commands += u32::from(command != Some(Command::Nop));
             print.lasting = mix(print.lasting, head | lasting);
             print.changing = mix(print.changing, changing << 16 | wkc);
             print.is_answered |= wkc > 0;

@@ -1,5 +1,7 @@
 //! Answers: the datagrams of a frame that came back, with what is known of their way.
 
+use std::iter;
+
 use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::{Addressing, Command, Effect};
 use linesman_proto::frame::{Datagram, FrameView};
@@ -33,7 +35,9 @@ const EVERYWHERE: [std::ops::Range<u16>; 17] = [
 /// Whether every controller has the register at this address.
 #[must_use]
 pub(crate) fn is_register_everywhere(ado: RegisterAddress) -> bool {
-    EVERYWHERE.iter().any(|range| range.contains(&ado.0))
+    // Most that is polled lies behind them all.
+    let [.., last] = &EVERYWHERE;
+    ado.0 < last.end && EVERYWHERE.iter().any(|range| range.contains(&ado.0))
 }
 
 /// One datagram on its way back, with all there is to know of it.
@@ -82,12 +86,14 @@ impl Answer<'_> {
 
     /// Whether it begins at a register that every controller has.
     #[must_use]
+    #[inline]
     pub fn is_everywhere(&self) -> bool {
         is_register_everywhere(self.ado)
     }
 
     /// The event bits that controllers set in it, where its request was seen; it may go out with some.
     #[must_use]
+    #[inline]
     pub fn added_events(&self) -> Option<u16> {
         let request = self.request.filter(|_| self.is_single && self.own > 0)?;
         Some(self.reply.irq() & !request.irq())
@@ -95,6 +101,7 @@ impl Answer<'_> {
 
     /// How many controllers it passed.
     #[must_use]
+    #[inline]
     pub fn passed(&self) -> Option<u16> {
         if !self.is_single || !self.command.increments_position() {
             return None;
@@ -118,43 +125,47 @@ fn handed(command: Command, request: Option<Datagram<'_>>) -> Command {
 }
 
 /// The datagrams of a frame that came back, one by one; `None` for one whose command is not known.
+#[inline]
 pub fn answers<'a>(
     exchange: &'a Exchange<'_>,
     request: Option<&FrameCopy<'a>>,
     reply: &FrameCopy<'a>,
 ) -> impl Iterator<Item = Option<Answer<'a>>> {
     let (at, frame) = (reply.time, reply.number);
-    let view = FrameView::parse(reply.bytes).ok();
-    let datagrams = view.into_iter().flat_map(|view| view.datagrams()).map_while(Result::ok);
+    let mut replies = FrameView::parse(reply.bytes).ok().map(|view| view.datagrams());
     let mut requests =
         request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
-    let answer = move |(index, datagram): (usize, Datagram<'a>)| {
-        let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
-        // A request may go out with a count in its working counter: what was added matters.
-        let sent = request.map_or(0, |request| request.wkc().0);
-        let sum = exchange.added(index, sent, datagram.wkc().0);
-        let own = datagram.wkc().0.saturating_sub(sent);
-        let Some(command) = datagram.command() else { return Some(None) };
-        let command = handed(command, request);
-        if exchange.is_part && sum == 0 {
-            return None;
+    let mut indexes = 0..;
+    iter::from_fn(move || {
+        loop {
+            let datagram = replies.as_mut()?.next()?.ok()?;
+            let index = indexes.next()?;
+            let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
+            // A request may go out with a count in its working counter: what was added matters.
+            let sent = request.map_or(0, |request| request.wkc().0);
+            let sum = exchange.added(index, sent, datagram.wkc().0);
+            let own = datagram.wkc().0.saturating_sub(sent);
+            let Some(command) = datagram.command() else { return Some(None) };
+            let command = handed(command, request);
+            if exchange.is_part && sum == 0 {
+                continue;
+            }
+            return Some(Some(Answer {
+                command,
+                effect: command.effect(),
+                request,
+                reply: datagram,
+                ado: datagram.ado(),
+                sum,
+                own,
+                is_last: exchange.is_last,
+                is_single: exchange.is_last && exchange.earlier.is_empty(),
+                sent_by: exchange.sent_by,
+                knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
+                sent_at: exchange.request.map(|request| request.time),
+                at,
+                frame,
+            }));
         }
-        Some(Some(Answer {
-            command,
-            effect: command.effect(),
-            request,
-            reply: datagram,
-            ado: datagram.ado(),
-            sum,
-            own,
-            is_last: exchange.is_last,
-            is_single: exchange.is_last && exchange.earlier.is_empty(),
-            sent_by: exchange.sent_by,
-            knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
-            sent_at: exchange.request.map(|request| request.time),
-            at,
-            frame,
-        }))
-    };
-    datagrams.enumerate().filter_map(answer)
+    })
 }

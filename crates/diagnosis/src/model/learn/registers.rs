@@ -200,9 +200,10 @@ pub(super) fn broadcast_read(model: &mut NetworkModel, answer: &Answer<'_>) {
     let mut news = false;
     for device in &mut model.devices {
         let status = AlStatus::new(state);
-        device.al.latest_reading = device.al.latest_reading.max(Some(answer.at));
+        let before = device.al.latest_reading;
+        device.al.latest_reading = Some(before.map_or(answer.at, |before| before.max(answer.at)));
         // Other bits than state and error are not known from here.
-        if device.al.state() != Some(state) || device.al.has_error() {
+        if !device.al.is_in(state) || device.al.has_error() {
             news |= device.al.record_status(status, answer.at, Some(answer.frame));
         }
     }
