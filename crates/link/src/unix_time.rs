@@ -23,12 +23,14 @@ impl UnixTime {
 
     /// The point `nanos` ns after the epoch.
     #[must_use]
+    #[inline]
     pub const fn from_nanos(nanos: i128) -> Self {
         Self(nanos)
     }
 
     /// Nanoseconds since the epoch.
     #[must_use]
+    #[inline]
     pub const fn as_nanos(self) -> i128 {
         self.0
     }
@@ -36,6 +38,7 @@ impl UnixTime {
     /// Time passed since `earlier`; `None` when `earlier` is in fact later. What a [`Span`] cannot
     /// hold (584 years) becomes the longest one it can.
     #[must_use]
+    #[inline]
     pub fn since(self, earlier: Self) -> Option<Span> {
         let nanos = self.0.checked_sub(earlier.0)?;
         (nanos >= 0).then(|| Span::ns(u64::try_from(nanos).unwrap_or(u64::MAX)))

@@ -208,8 +208,9 @@ impl Pcapng {
         drops: Option<u64>,
         described: &mut [CaptureInterface],
     ) -> Result<Record, Damage> {
-        let [interface, ticks_high, ticks_low, len, original_len] =
-            [8, 12, 16, 20, 24].map(|at| self.order.u32_at(block, at));
+        let word = |at| self.order.u32_at(block, at);
+        let (interface, ticks_high, ticks_low) = (word(8), word(12), word(16));
+        let (len, original_len) = (word(20), word(24));
         let room = block.len() - 4 - ENHANCED_DATA;
         check_frame_len(len, room)?;
         let id = self.find(interface)?;

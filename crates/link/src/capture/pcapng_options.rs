@@ -93,7 +93,8 @@ impl FrameOptions {
     pub(super) fn read(order: ByteOrder, mut options: &[u8]) -> Self {
         let mut read = Self::default();
         while let Some((head, rest)) = options.split_first_chunk::<4>() {
-            let [code, len] = [[head[0], head[1]], [head[2], head[3]]].map(u16::from_le_bytes);
+            let code = u16::from_le_bytes([head[0], head[1]]);
+            let len = u16::from_le_bytes([head[2], head[3]]);
             let (code, len) = (OptionCode(order.u16(code)), usize::from(order.u16(len)));
             if code == OptionCode::EndOfOpt {
                 break;

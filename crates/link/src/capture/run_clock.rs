@@ -95,6 +95,7 @@ impl RunClock {
     }
 
     /// Places the next frame of the file. One without a time takes the latest so far.
+    #[inline]
     pub fn place(&mut self, interface: CaptureInterfaceId, time: Option<UnixTime>) -> Moment {
         let Some(time) = time else {
             return Moment { at: self.latest(), backward: None };
@@ -121,6 +122,7 @@ impl RunClock {
 
     /// The time of the run that a time of the capture is; [`Instant::ZERO`] also for what lies before the origin.
     #[must_use]
+    #[inline]
     pub fn at(&self, time: UnixTime) -> Instant {
         let since = self.origin.and_then(|origin| time.since(origin));
         Instant::ZERO + since.unwrap_or(Span::ZERO)
