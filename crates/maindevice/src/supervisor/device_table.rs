@@ -112,6 +112,8 @@ pub(crate) struct DeviceTable {
     pub(crate) opened_until: Instant,
     /// The delays that clocks were told are those of the line as it is; `None` where nobody measures them again.
     pub(super) delays_known: Option<bool>,
+    /// How often clocks were told other delays than they had.
+    pub(super) delays_told: u64,
     /// Receive times are being latched and read.
     pub(super) is_latching: bool,
 }

@@ -32,23 +32,30 @@ pub(super) async fn keep_in_step(context: Context) {
     let is_open = || {
         wire.ring_intact() == Some(false) && wire.now() >= lock(&context.device_table).opened_until
     };
-    let mut known = None;
+    let (mut known, mut measured_by) = (None, 0);
     loop {
         while !is_open() {
             wire.sleep(LOOK).await;
         }
-        let responding = lock(&context.device_table).responding();
+        let (responding, told) = {
+            let device_table = lock(&context.device_table);
+            (device_table.responding(), device_table.delays_told)
+        };
         let measured_at = wire.now();
         let measured = mean(&context).await;
         // A group that came or went at the same break changes nothing but the noise of the measurement.
         let is_noise = |old: i64, new: i64| old.abs_diff(new) < SAME_BREAK.as_nanos();
-        if known.zip(measured).is_none_or(|(old, new)| !is_noise(old, new)) {
+        let is_anew = measured_by != told;
+        measured_by = told;
+        if is_anew || known.zip(measured).is_none_or(|(old, new)| !is_noise(old, new)) {
             lock(&context.device_table).set_second_card_ns(measured);
             known = measured;
         }
         let is_same = || {
             // Another break, or one of two that is mended, leaves others behind it.
-            lock(&context.device_table).responding() == responding
+            let device_table = lock(&context.device_table);
+            device_table.responding() == responding
+                && device_table.delays_told == told
                 && (measured.is_some() || wire.now().since(measured_at) < AGAIN)
         };
         while is_open() && is_same() {
