@@ -141,6 +141,7 @@ impl Office {
 }
 
 /// Fetches a file of so many bytes from a device with such a cycle, while this share of the fragments is lost both ways.
+#[expect(clippy::disallowed_macros, reason = "figures for the documents")]
 fn fetch_file(name: &str, us: u64, share: f64, len: usize) -> Transfer {
     let fault = match share > 0.0 {
         true => format!(
