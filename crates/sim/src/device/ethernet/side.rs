@@ -89,10 +89,10 @@ impl EthernetSide {
             IpHost::new(&format!("{name}, port {}", host.port), mac, host.address)
         };
         let ports = match function {
-            EthernetFunction::SwitchPorts(ports) => 1..=ports,
-            EthernetFunction::IpApplication => 1..=0,
+            EthernetFunction::SwitchPorts(ports) => ports,
+            EthernetFunction::IpApplication => 0,
         };
-        let free = ports.filter(|port| hosts.iter().all(|host| host.port != *port)).collect();
+        let free = (1..=ports).filter(|port| hosts.iter().all(|host| host.port != *port)).collect();
         let hosts = (1..).zip(hosts).map(plugged).collect();
         Self {
             mac: *mac,
