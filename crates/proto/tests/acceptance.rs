@@ -31,8 +31,8 @@ fn sent_and_read(command: Command, address: DatagramAddress) -> DatagramAddress 
     let mut builder = FrameBuilder::new(&mut buffer, MacAddress([2, 0, 0, 0, 0, 1]));
     builder.push(command, 0, address, 2).expect("it fits");
     let len = builder.finish();
-    let view = FrameView::parse(&buffer[..len]).unwrap();
-    let datagram = view.datagrams().next().unwrap().unwrap();
+    let view = FrameView::parse(&buffer[..len]).expect("a frame");
+    let datagram = view.datagrams().next().expect("a datagram").expect("a whole one");
     match address {
         DatagramAddress::Logical(_) => DatagramAddress::Logical(datagram.logical()),
         DatagramAddress::Physical(..) => DatagramAddress::Physical(datagram.adp(), datagram.ado()),

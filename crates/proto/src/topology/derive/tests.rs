@@ -126,6 +126,20 @@ fn receive_times_of_closed_ports_are_not_looked_at() {
 }
 
 #[test]
+fn port_without_time_is_one_that_the_frame_did_not_come_back_to() {
+    let found = of(&[timed(&[(C, 10), (B, 900)]), open(&[A])]);
+    assert_eq!(found.entry_basis[0], EntryBasis::ReceiveTimes);
+    let mut ring = timed(&[(C, 10), (B, 900)]);
+    ring.open[A] = true;
+    let found = of(&[ring, open(&[A])]);
+    assert_eq!((found.tree.entry(0), found.entry_basis[0]), (C, EntryBasis::ReceiveTimes));
+    // Those that are known are in order all the same, or of no use.
+    let mut disordered = timed(&[(A, 0), (B, 500), (D, 900)]);
+    disordered.open[C] = true;
+    assert_eq!(of(&[disordered]).doubts, [Doubt::ReceiveTimes { node: 0 }]);
+}
+
+#[test]
 fn receive_times_wrap() {
     let found = of(&[timed(&[(B, u32::MAX - 50), (C, 700), (A, 900)]); 1]);
     assert_eq!(found.tree.entry(0), B);
