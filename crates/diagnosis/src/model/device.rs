@@ -86,8 +86,6 @@ pub struct Device {
     /// When a frame was received at each port, by its own clock: registers 0x0900 to 0x090F as last
     /// read. Those of closed ports mean nothing; `None` for one that the frame did not meet.
     pub received: Option<PortMap<Option<DcTime32>>>,
-    /// The same registers with what ports have left over that the frame did not meet.
-    pub latched: Option<PortMap<DcTime32>>,
     /// Time since it came up, as last read.
     pub up_time: Option<UpTime>,
     /// Whether its SYNC signals are switched on: register 0x0981 as last written.
@@ -292,7 +290,6 @@ impl Device {
             mailbox: MailboxHistory::default(),
             watchdog: Watchdog::default(),
             received: None,
-            latched: None,
             up_time: None,
             sync_on: None,
             clock: ClockHistory::default(),

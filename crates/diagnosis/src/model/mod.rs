@@ -168,7 +168,7 @@ pub struct NetworkModel {
     loops_first_ordered: Option<Instant>,
     /// DL control as it was written for temporary use, in the order of time.
     pub loop_writes: VecDeque<LoopWrite>,
-    /// Whether the frame that latched receive times last went round a closed ring, in both directions.
+    /// Whether the frame that latched receive times last went out by both cards of a ring.
     pub latched_in_ring: bool,
     revision: u64,
     /// From how many controllers and receive times the tree was derived.

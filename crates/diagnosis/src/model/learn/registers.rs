@@ -217,8 +217,7 @@ pub(super) fn broadcast_write(model: &mut NetworkModel, answer: &Answer<'_>) {
     let data = answer.written();
     let mut news = false;
     if touches(answer.ado, data, RECEIVE_TIMES..RECEIVE_TIMES + 1) {
-        // One copy was processed by all, the other one came the other way.
-        model.latched_in_ring = !answer.is_single && (answer.own == 0 || answer.own == answer.sum);
+        model.latched_in_ring = !answer.is_single;
     }
     if touches(answer.ado, data, CLOCK_SETTING) {
         model.references.iter_mut().for_each(|reference| reference.set(answer.at));
@@ -328,32 +327,25 @@ fn dl_status(device: &Device, data: &[u8], start: RegisterAddress) -> Option<DlS
 
 /// Takes the receive times of a controller. Says whether they tell anything.
 ///
-/// In a closed ring the frame does not come back to the ports that lead on: these keep what they had, so that only a port
-/// whose time has changed since the reading before was met. A port that is closed by order, as the end of a ring is while
-/// delays are measured, keeps its time as well.
+/// In a closed ring the frame does not come back to the ports that lead on: what they show is of the copy that went the other
+/// way, or of an earlier frame. In an open one those of the far half met it the other way round. A port that is closed by order, as the end of a ring is while delays are measured, keeps the
+/// time that it had.
 fn learn_receive_times(
     model: &mut NetworkModel,
     id: DeviceId,
     bytes: &[u8],
     read_at: Instant,
 ) -> bool {
-    let closed = model.closed_by_order(id, read_at);
-    let in_ring = model.latched_in_ring;
-    let Some(device) = model.devices.get_mut(id.index()) else { return false };
-    let latched: PortMap<DcTime32> = PortMap::from_fn(|port| {
-        let at = 4 * port.index();
-        let bytes = bytes.get(at..at + 4).and_then(|bytes| bytes.first_chunk());
-        DcTime32(bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes)))
-    });
-    let before = device.latched.replace(latched);
-    let has_changed =
-        |port: Port| before.is_some_and(|before: PortMap<DcTime32>| before[port] != latched[port]);
-    if in_ring && !Port::ALL.into_iter().any(has_changed) {
+    if model.latched_in_ring {
         return false;
     }
+    let closed = model.closed_by_order(id, read_at);
+    let Some(device) = model.devices.get_mut(id.index()) else { return false };
     device.received = Some(PortMap::from_fn(|port| {
-        let was_met = closed != Some(port) && (!in_ring || has_changed(port));
-        was_met.then_some(latched[port])
+        let at = 4 * port.index();
+        let bytes = bytes.get(at..at + 4).and_then(|bytes| bytes.first_chunk());
+        let time = DcTime32(bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes)));
+        (closed != Some(port)).then_some(time)
     }));
     true
 }
@@ -364,3 +356,52 @@ fn touches(start: RegisterAddress, data: &[u8], range: std::ops::Range<u16>) -> 
 }
 
 const _: () = assert!(COUNTERS.end - COUNTERS.start == ErrorCounters::LEN as u16);
+
+#[cfg(test)]
+mod tests {
+    use linesman_proto::time::Span;
+
+    use super::*;
+
+    /// Receive times of the ports, with text left over where there is no port.
+    fn times(a: u32, c: u32) -> Vec<u8> {
+        let left_over = u32::from_le_bytes(*b"left");
+        [a, left_over, c, left_over].into_iter().flat_map(u32::to_le_bytes).collect()
+    }
+
+    #[test]
+    fn receive_times_tell_nothing_in_a_ring_and_of_a_port_that_is_closed_by_order() {
+        let (id, at) = (DeviceId(0), Instant::ZERO + Span::ms(300));
+        let mut model = NetworkModel { devices: vec![Device::new(id)], ..NetworkModel::default() };
+        model.latched_in_ring = true;
+        assert!(!learn_receive_times(&mut model, id, &times(5_000, 10), at));
+        assert_eq!(model.devices[0].received, None);
+
+        // The end of the ring is closed for a moment: its time is an old one.
+        model.latched_in_ring = false;
+        let seen = Seen::new((), at, None);
+        model.note_loops(LoopWrite { device: id, closed: Some(Port::C), seen });
+        assert!(learn_receive_times(&mut model, id, &times(9_000, 10), at + Span::ms(1)));
+        let received = model.devices[0].received.expect("it was read");
+        assert_eq!((received[Port::A], received[Port::C]), (Some(DcTime32(9_000)), None));
+
+        // A port that was closed for temporary use opens by itself.
+        assert!(learn_receive_times(&mut model, id, &times(9_000, 9_700), at + Span::s(2)));
+        let received = model.devices[0].received.expect("it was read");
+        assert_eq!(received[Port::C], Some(DcTime32(9_700)));
+    }
+
+    #[test]
+    fn what_is_lost_while_a_port_is_closed_by_order_is_so_when_the_port_is_open_again() {
+        let ms = |ms: u64| Instant::ZERO + Span::ms(ms);
+        let mut model = NetworkModel::default();
+        model.note_order(ms(300));
+        model.note_order(ms(310));
+        let by_order: Vec<bool> =
+            [297, 299, 303, 400, 511].map(|at| model.is_lost_by_order(ms(at))).to_vec();
+        assert_eq!(by_order, [false, true, true, true, false]);
+        // Another order much later has nothing to do with the first.
+        model.note_order(ms(900));
+        assert!(!model.is_lost_by_order(ms(303)));
+    }
+}
