@@ -194,8 +194,12 @@ async fn tell(
         }
     }
     if is_other {
-        // What frames of the second card add is measured at one of these clocks.
-        lock(&context.device_table).delays_told += 1;
+        let mut device_table = lock(&context.device_table);
+        device_table.delays_told += 1;
+        if base.station != reference {
+            // What frames of the second card add is measured at this clock from now on.
+            device_table.far_base = Some(base.station);
+        }
     }
     Ok(())
 }

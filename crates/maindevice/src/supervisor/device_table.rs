@@ -114,6 +114,8 @@ pub(crate) struct DeviceTable {
     pub(super) delays_known: Option<bool>,
     /// How often clocks were told other delays than they had.
     pub(super) delays_told: u64,
+    /// Of the half of an open ring without the reference, the clock whose delay stayed as it was then.
+    pub(super) far_base: Option<StationAddress>,
     /// Receive times are being latched and read.
     pub(super) is_latching: bool,
 }

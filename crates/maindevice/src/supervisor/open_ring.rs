@@ -32,7 +32,7 @@ pub(super) async fn keep_in_step(context: Context) {
     let is_open = || {
         wire.ring_intact() == Some(false) && wire.now() >= lock(&context.device_table).opened_until
     };
-    let (mut known, mut measured_by) = (None, 0);
+    let mut known = None;
     loop {
         while !is_open() {
             wire.sleep(LOOK).await;
@@ -45,9 +45,7 @@ pub(super) async fn keep_in_step(context: Context) {
         let measured = mean(&context).await;
         // A group that came or went at the same break changes nothing but the noise of the measurement.
         let is_noise = |old: i64, new: i64| old.abs_diff(new) < SAME_BREAK.as_nanos();
-        let is_anew = measured_by != told;
-        measured_by = told;
-        if is_anew || known.zip(measured).is_none_or(|(old, new)| !is_noise(old, new)) {
+        if known.zip(measured).is_none_or(|(old, new)| !is_noise(old, new)) {
             lock(&context.device_table).set_second_card_ns(measured);
             known = measured;
         }
@@ -63,7 +61,9 @@ pub(super) async fn keep_in_step(context: Context) {
         }
         if !is_open() {
             known = None;
-            lock(&context.device_table).set_second_card_ns(None);
+            let mut device_table = lock(&context.device_table);
+            device_table.set_second_card_ns(None);
+            device_table.far_base = None;
         }
     }
 }
@@ -85,7 +85,10 @@ async fn measure(context: &Context) -> Result<Option<i64>, ExchangeError> {
     let (reference, others) = {
         let device_table = lock(&context.device_table);
         let Some(reference) = device_table.reference_clock() else { return Ok(None) };
-        (reference, device_table.with_time().collect::<Vec<_>>())
+        let mut others: Vec<_> = device_table.with_time().collect();
+        // Those of the others may have been told anew, and are on their way to it.
+        others.sort_by_key(|station| Some(*station) != device_table.far_base);
+        (reference, others)
     };
     let alone = clocks::latch_alone(context).await;
     wire.ask(Request::write(Target::All, register::RECEIVE_TIME.address, &[0; 4])).await?;
