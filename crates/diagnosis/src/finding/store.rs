@@ -14,7 +14,7 @@ use super::{Condition, Place, Severity, Symptom};
 const AFTER: Span = Span::s(3);
 /// The same for what is only counted: errors follow at once, and are read soon after.
 const AFTER_COUNTED: Span = Span::s(1);
-/// Damaged frames at the card so long before an outage are none of its doing: a contact that opens spoils frames for some ms.
+/// Damaged frames at the card so long before its link is lost are not of that: a contact that opens spoils frames for some ms.
 const BEFORE_OUTAGE: Span = Span::ms(500);
 
 /// A finding that has been over for so long stays, though the rule does not speak of it any more.
@@ -302,7 +302,9 @@ fn explains(cause: &Finding, effect: &Finding) -> bool {
 /// doing, however long it went on.
 fn began_after(cause: &Finding, effect: &Finding) -> bool {
     let is_of_card = effect.condition.symptoms.iter().all(|one| *one == Symptom::CardErrors);
-    let was_before = is_of_card && effect.opened + BEFORE_OUTAGE < cause.opened;
+    let is_outage = cause.condition.accounts_for(&Symptom::NoCarrier);
+    let before = if is_outage { BEFORE_OUTAGE } else { AFTER_COUNTED };
+    let was_before = is_of_card && effect.opened + before < cause.opened;
     was_before || effect.closed.is_some_and(|closed| closed + AFTER < cause.opened)
 }
 
