@@ -12,11 +12,12 @@ use linesman_proto::time::Instant;
 pub struct TimeShare {
     shared: Arc<SharedTimes>,
     place: usize,
+    has_begun: bool,
 }
 
 #[derive(Debug)]
 struct SharedTimes {
-    /// When each line works next, or works now; [`Instant::MAX`]: it has ended.
+    /// Time at which each line works next, or works now; [`Instant::MAX`]: it has ended.
     times: Mutex<Vec<Instant>>,
     changed: Condvar,
 }
@@ -34,7 +35,16 @@ impl TimeShare {
     pub fn of(lines: usize) -> Vec<Self> {
         let times = Mutex::new(vec![Instant::ZERO; lines]);
         let shared = Arc::new(SharedTimes { times, changed: Condvar::new() });
-        (0..lines).map(|place| Self { shared: Arc::clone(&shared), place }).collect()
+        (0..lines)
+            .map(|place| Self { shared: Arc::clone(&shared), place, has_begun: false })
+            .collect()
+    }
+
+    /// Waits for the turn of this line at time zero, when it begins; at once from then on.
+    pub fn begin(&mut self) {
+        if !std::mem::replace(&mut self.has_begun, true) {
+            self.wait(Instant::ZERO);
+        }
     }
 
     /// Waits until no other line has work before `until`; of equal times the line that comes first is first.
@@ -63,6 +73,25 @@ impl Drop for TimeShare {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_begin_in_their_order() {
+        let order = Mutex::new(Vec::new());
+        std::thread::scope(|scope| {
+            // The last one is there first.
+            for mut share in TimeShare::of(3).into_iter().rev() {
+                let order = &order;
+                scope.spawn(move || {
+                    share.begin();
+                    order.lock().unwrap().push(share.place);
+                    share.wait(Instant::from_nanos(100));
+                    share.begin();
+                });
+                std::thread::yield_now();
+            }
+        });
+        assert_eq!(order.into_inner().unwrap(), [0, 1, 2]);
+    }
 
     #[test]
     fn lines_take_their_turns_by_time_and_an_ended_one_is_not_waited_for() {

@@ -94,6 +94,9 @@ impl Transport for SegmentTransport {
     }
 
     fn receive(&mut self, now: Instant, intake: &mut dyn FrameSink) -> Result<usize, LinkError> {
+        if let Some(share) = &mut self.share {
+            share.begin();
+        }
         self.line.advance(now);
         self.wiring.carry(self.line.segment_mut().signals_mut());
         Ok(self.line.receive(intake))
