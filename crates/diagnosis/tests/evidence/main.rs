@@ -15,6 +15,7 @@ mod joined_late;
 mod late;
 mod listened_host;
 mod locate;
+mod mailbox_bits;
 mod main_device;
 mod missed;
 mod observation;

@@ -3,15 +3,12 @@
 //! A MainDevice that sees the bit asks for nothing until it is set, and fetches the answer when it has the time. The bit
 //! tells when the SubDevice was done.
 
-use linesman_proto::address::{DeviceId, LogicalAddress, RegisterAddress};
-use linesman_proto::register::FmmuConfig;
+use linesman_proto::address::{DeviceId, LogicalAddress};
+use linesman_proto::register::{FmmuConfig, SmStatus};
 
 use super::Answer;
 use super::registers::MAILBOX_IN_STATUS;
 use crate::model::{Device, NetworkModel};
-
-/// The bit of that status which says that a message lies in the mailbox.
-const FULL: u8 = 3;
 
 /// A mailbox whose answer is waited for, and the bit that will tell of it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -46,9 +43,8 @@ pub(super) fn look(model: &mut NetworkModel, answer: &Answer<'_>) {
     });
 }
 
-/// Where process data have the bit, as FMMUs were seen set up.
+/// Place of the bit in process data, as FMMUs were seen set up.
 fn bit_of(device: &Device) -> Option<(LogicalAddress, u8)> {
-    let wanted = (RegisterAddress(MAILBOX_IN_STATUS), FULL);
     let maps = |fmmu: &&FmmuConfig| {
         let first = fmmu.physical_start.0;
         let behind = u32::from(first) + u32::from(fmmu.length);
@@ -62,6 +58,10 @@ fn bit_of(device: &Device) -> Option<(LogicalAddress, u8)> {
         bits.map(|(byte, bit)| {
             (LogicalAddress(fmmu.logical_start.0.saturating_add(u32::from(byte))), bit)
         })
-        .find(|(at, bit)| fmmu.locate_bit(*at, *bit) == Some(wanted))
+        .find(|(at, bit)| {
+            fmmu.locate_bit(*at, *bit).is_some_and(|(register, bit)| {
+                register.0 == MAILBOX_IN_STATUS && SmStatus(1 << bit).mailbox_full()
+            })
+        })
     })
 }
