@@ -124,6 +124,17 @@ class Bench:
         return self.packets(NEAR, ["tx"])
 
 
+def ask(path, request, seconds):
+    """Asks a control socket, of a segment or of a run; the answer has no error."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.settimeout(seconds)
+        line.connect(str(path))
+        line.sendall(json.dumps(request).encode() + b"\n")
+        answer = json.loads(line.makefile().readline())
+    assert answer["error"] is None, answer["error"]
+    return answer
+
+
 class Segment:
     """A virtual segment on the far end; use it in `with`."""
 
@@ -152,13 +163,7 @@ class Segment:
 
     def ask(self, **request):
         """Asks the segment as `linesman fault` does; any program may."""
-        with socket.socket(socket.AF_UNIX) as line:
-            line.settimeout(10)
-            line.connect(str(self.socket))
-            line.sendall(json.dumps(request).encode() + b"\n")
-            answer = json.loads(line.makefile().readline())
-        assert answer["error"] is None, answer["error"]
-        return answer
+        return ask(self.socket, request, 10)
 
     def wires(self):
         """Which output each input is wired to."""

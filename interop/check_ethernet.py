@@ -4,14 +4,13 @@ network namespace of its own."""
 import contextlib
 import json
 import shutil
-import socket
 import statistics
 import subprocess
 import sys
 import threading
 import time
 
-from bench import HERE, NEAR, Segment, inside, ip, parse
+from bench import HERE, NEAR, Segment, ask, inside, ip, parse
 from check_own import wait_for
 from harness import LINESMAN, check
 
@@ -98,13 +97,7 @@ class Driven:
         wait_for(line, self.run, self.control, ["OP"] * DEVICES)
 
     def ask(self, **request):
-        with socket.socket(socket.AF_UNIX) as one:
-            one.settimeout(20)
-            one.connect(str(self.control))
-            one.sendall(json.dumps(request).encode() + b"\n")
-            answer = json.loads(one.makefile().readline())
-        assert answer["error"] is None, answer["error"]
-        return answer
+        return ask(self.control, request, 20)
 
     def lateness(self):
         return self.ask(do="status")["run"]["lateness"]
