@@ -38,7 +38,7 @@ pub struct OnlineReport {
     /// The time of the network; `null`: no clocks are in use.
     #[serde(default)]
     pub clock: Option<OnlineClock>,
-    /// How this network stands to the others of the run; `null`: it is the only one.
+    /// The group of networks that it runs in; `null`: it is the only one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<GroupTime>,
     /// The SubDevices, by number.

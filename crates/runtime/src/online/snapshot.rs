@@ -67,7 +67,7 @@ pub struct Snapshot {
     pub responding_by_card: Option<[WorkingCounter; 2]>,
     /// True if the network leads the others of the process.
     pub leads_group: bool,
-    /// How far it is ahead of the one that leads, in ns.
+    /// Lead over the network that leads, in ns.
     pub ahead_of_group: Option<i64>,
     /// Mailboxes in which something went wrong: whose, how often, and what stands.
     pub mailboxes: Vec<(DeviceId, u64, Vec<ProtocolError>)>,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug)]
 pub struct NetworkPlace {
     network: NetworkGroup,
-    /// What the lines are called, in their order.
+    /// Names of the lines, in their order.
     lines: Arc<[String]>,
 }
 

@@ -58,7 +58,7 @@ pub struct RunReport {
     /// What went through the virtual switch; `null`: no SubDevice speaks EoE, and no interface was wanted.
     #[serde(default)]
     pub ethernet: Option<EthernetReport>,
-    /// How this network stands to the others of the run; `null`: it is the only one.
+    /// The group of networks that it ran in; `null`: it is the only one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<GroupTime>,
     /// Hot connect groups that were plugged in and are kept in INIT, each with the reason and the next step.
