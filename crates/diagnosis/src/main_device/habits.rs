@@ -25,7 +25,7 @@ const TELLING: [(RegisterAddress, u16); 4] = [
     (RegisterAddress(0x0310), 4),
 ];
 
-/// Where the last of them ends.
+/// End of the last of them.
 const TELLING_END: u16 = {
     let (register, len) = TELLING[TELLING.len() - 1];
     register.0 + len

@@ -24,9 +24,9 @@ pub struct MailboxHistory {
     pub reads_whole: bool,
     /// When somebody last looked for an answer.
     pub polled: Option<Instant>,
-    /// When it was last seen without a message since the request that waits was taken.
+    /// The last look that found no message since the request that waits was taken.
     pub seen_empty: Option<Instant>,
-    /// When it was first seen with a message that nobody has fetched yet, since that request was taken.
+    /// The first look that found a message, which nobody has fetched yet, since that request was taken.
     pub seen_full: Option<Instant>,
     /// Since when, and until when, requests are not taken; `None` when the latest one was.
     pub full: Option<(Seen<()>, Instant)>,
@@ -74,7 +74,7 @@ pub struct SlowAnswer {
     pub object: Option<ObjectAddress>,
     /// When it was asked.
     pub asked: Instant,
-    /// How long the SubDevice took at least: until its answer was seen in the mailbox, or the mailbox was last seen without it. An
+    /// Time that the SubDevice took at least: until its answer was seen in the mailbox, or the mailbox was last seen without it. An
     /// answer that lies there until somebody has the time to fetch it is not late.
     pub took: Span,
     /// Not an answer came late: a fragment of an Ethernet frame was taken late, which nothing answers.

@@ -168,7 +168,7 @@ pub struct NetworkModel {
     loops_first_ordered: Option<Instant>,
     /// DL control as it was written for temporary use, in the order of time.
     pub loop_writes: VecDeque<LoopWrite>,
-    /// Whether the frame that latched receive times last went out by both cards of a ring.
+    /// True if the frame that latched receive times last went out by both cards of a ring.
     pub latched_in_ring: bool,
     revision: u64,
     /// From how many controllers and receive times the tree was derived.
@@ -282,7 +282,7 @@ impl NetworkModel {
         })
     }
 
-    /// Notes that DL control was written to stay.
+    /// Notes that somebody wrote DL control at `at`.
     pub fn note_order(&mut self, at: Instant) {
         let goes_on = self.loops_ordered.is_some_and(|last| at.since(last) < ORDER_LASTS);
         if !goes_on {

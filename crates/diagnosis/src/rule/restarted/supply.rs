@@ -13,7 +13,7 @@ use crate::model::{NetworkModel, Seen};
 /// That a supply is gone is noticed so much later at the most.
 const NOTICED_LATE: Span = Span::ms(500);
 
-/// When it was back; `None` where the clock does not tell.
+/// Time at which it was back; `None` where the clock does not tell.
 fn back_at(fall: &Fall<'_>) -> Option<Instant> {
     let (since, until) = (fall.began(), fall.gone?.1);
     fall.device.up_time?.began_within(since.before(NOTICED_LATE), until)
@@ -27,7 +27,7 @@ pub(super) fn away(fall: &Fall<'_>) -> Option<Span> {
 /// True if one of two was back on the line long before the other one had its supply again: then it was not the same supply,
 /// whichever was missed first. Who starts anew again and again proves nothing by its latest start.
 ///
-/// Who has no clock came back with the one before it, where both were seen on their way up at the same time.
+/// A SubDevice without a clock came back with the one before it, where both were seen on their way up at the same time.
 pub(super) fn are_apart(model: &NetworkModel, falls: &[Fall<'_>], pair: [&Fall<'_>; 2]) -> bool {
     let is_single = |fall: &Fall<'_>| {
         fall.device.al.changes.iter().filter(|change| change.is_own_fall()).count() == 1
