@@ -321,7 +321,7 @@ impl NetworkChoices<'_> {
     }
 }
 
-/// How a line is judged.
+/// The set-up of a line's diagnosis.
 fn setup(source: &Source, on: &str) -> Setup {
     Setup {
         input: InputKind::Driven,

@@ -63,7 +63,7 @@ impl Networks {
         words
     }
 
-    /// How the networks stand to each other at the end of a run.
+    /// Group times of the networks at the end of a run.
     fn run(&self, seconds: &str) -> (String, Vec<Value>) {
         let run = linesman(self.words(&["--seconds", seconds, "--json"]));
         assert_eq!(run.status, 0, "{}", run.all());

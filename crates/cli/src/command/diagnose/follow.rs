@@ -77,7 +77,7 @@ const HELD: Span = Span::ms(50);
 /// Tells what happens to findings.
 pub(crate) struct Follower {
     json: bool,
-    /// What stands before each line for people: the line, where there are several.
+    /// Prefix of each line for people: the line's name, where there are several.
     prefix: String,
     /// What people have not been told yet, oldest first.
     held: Vec<Event>,

@@ -38,7 +38,7 @@ use crate::version;
 /// After so long without news, what was waited with is told.
 const QUIET: Duration = Duration::from_millis(100);
 
-/// So often it is looked whether logs and socket still work.
+/// Interval at which logs and socket are looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Notes of a network that are told before those of the next one.
@@ -67,7 +67,7 @@ fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn Diagnosis
     }
 }
 
-/// What runs beside a line.
+/// Services and recorders that run beside a line.
 #[derive(Default)]
 pub(super) struct Companions {
     socket: Option<ServiceSocket>,
@@ -156,7 +156,8 @@ impl RunningNetwork {
     }
 }
 
-/// Runs each line in a thread of its own, and tells what happens meanwhile. When one ends, all do.
+/// Runs each line in a thread of its own, and tells what happens meanwhile. When one fails, all are stopped;
+/// where no time was given, when one ends.
 pub(super) fn drive<L: Transport<Error = LinkError> + Send>(
     runs: Vec<(L, NetworkRun)>,
     stop: &Stop,

@@ -30,7 +30,7 @@ pub(super) struct RunReporter {
     json: bool,
     /// The line.
     on: String,
-    /// What stands before each line for people: the line, where there are several.
+    /// Prefix of each line for people: the line's name, where there are several.
     prefix: String,
     names: Names,
     follower: Follower,

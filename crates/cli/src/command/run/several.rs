@@ -11,7 +11,7 @@ use crate::failure::Failure;
 use crate::text::quantity::count;
 use crate::version;
 
-/// How several networks were run, as JSON.
+/// Report of a run of several networks, as JSON.
 #[derive(Clone, PartialEq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::command) struct RunReports {
@@ -29,7 +29,7 @@ impl RunReports {
     }
 }
 
-/// What was asked for one network.
+/// Options of one network.
 pub(super) struct NetworkChoices<'a> {
     pub(super) on: &'a str,
     pub(super) file: Option<&'a PathBuf>,
