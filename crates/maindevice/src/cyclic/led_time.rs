@@ -91,7 +91,7 @@ pub(super) struct LedTime {
     offset: Option<i64>,
     held: Option<HeldClock>,
     pairs: OutsidePairs,
-    /// How far the network is ahead of the one that leads, in ns.
+    /// Lead of the network over the one that leads, in ns.
     ahead_of_group: Option<i64>,
 }
 
@@ -115,7 +115,7 @@ impl LedTime {
         Some(Self { source, offset, held, pairs: OutsidePairs::default(), ahead_of_group })
     }
 
-    /// How far the network is ahead of the one that leads its group, in ns, with the last frame.
+    /// Lead of the network over the one that leads its group, in ns, with the last frame.
     pub(super) const fn ahead_of_group(&self) -> Option<i64> {
         self.ahead_of_group
     }

@@ -210,7 +210,7 @@ impl Cyclic {
         }
     }
 
-    /// How far it is ahead of the network that leads its group, in ns, if it follows one.
+    /// Lead over the network that leads its group, in ns, if it follows one.
     pub(crate) fn ahead_of_group(&self) -> Option<i64> {
         self.led_time.as_ref()?.ahead_of_group()
     }

@@ -88,7 +88,7 @@ pub(crate) struct Exchange {
     patience: Span,
     /// Whether what one card sends arrives at the other: `None` before the first frame, or with one card.
     ring_intact: Option<bool>,
-    /// How many copies of each card have been given up since one of it came back.
+    /// Copies of each card that have been given up since one of it came back.
     silent: [u8; 2],
     /// How many counted in what each card received of the last broadcast read of a ring's cycle.
     responding_by_card: Option<[WorkingCounter; 2]>,

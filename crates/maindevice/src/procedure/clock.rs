@@ -23,7 +23,7 @@ use crate::executor::Wire;
 const THROUGH_UNIT: Span = Span::ns(20);
 /// The bandwidth of the time loop (0x0930) that writing it anew resets all filters to.
 const SPEED_START: u16 = 0x1000;
-/// How often receive times are latched while a ring opens and closes.
+/// Attempts at latching receive times while a ring opens and closes.
 const ATTEMPTS: u32 = 4;
 /// 0x0900 to 0x090F, the receive times of all ports.
 const RECEIVE_TIMES_LEN: u16 = 4 * register::RECEIVE_TIME.len;

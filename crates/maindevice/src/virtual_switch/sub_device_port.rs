@@ -34,7 +34,7 @@ pub struct SubDevicePort {
     counts: FragmentCounts,
     /// Port and number of the latest frame of which something came.
     latest: Option<(u8, u8)>,
-    /// How many frames in a row had the number behind the one before, up to [`NUMBERED`].
+    /// Frames in a row that had the number behind the one before, up to [`NUMBERED`].
     in_row: u8,
     next_number: u8,
 }

@@ -107,7 +107,7 @@ fn clocks_behind_a_group_that_joins_and_leaves_are_told_their_new_delays() {
     }
 }
 
-/// What each coupler was told of its delay (0x0928), in ns.
+/// Delay that each coupler was told (0x0928), in ns.
 fn told(bench: &Bench) -> Vec<u32> {
     let delay = |number: usize| {
         let controller = bench.segment.controller(bench.id(&format!("K{number}"))).unwrap();

@@ -40,7 +40,7 @@ const AT_ONCE: usize = 2;
 /// Bytes of the file.
 const FILE: usize = 1_000_000;
 
-/// What became of a transfer.
+/// Outcome of a transfer.
 #[derive(Debug)]
 struct Transfer {
     bytes_per_second: f64,

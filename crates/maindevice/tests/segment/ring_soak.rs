@@ -16,7 +16,7 @@ use crate::bench::Bench;
 use crate::hot_connect::{source, story};
 use crate::ring_cuts::cut;
 
-/// How often it is looked how far clocks are apart.
+/// Interval at which clocks are compared.
 const SAMPLED: Span = Span::ms(5);
 /// Entries of the log that are kept.
 const LOGGED: usize = 60;
@@ -48,7 +48,7 @@ const PLACES: [(&str, bool); 8] = [
     ("J2.D", true),
     ("J2.B", true),
 ];
-/// Where each tool is planned, of [`PLACES`].
+/// Planned place of each tool, of [`PLACES`].
 const PLANNED: [usize; 3] = [0, 2, 3];
 
 /// The segment file: couplers in a ring with a terminal each, and junctions at three of them. Clocks of couplers come before the tools
@@ -148,15 +148,15 @@ pub(crate) struct Observed {
     pub(crate) lost_by_break: u32,
     pub(crate) lost_by_pull: u32,
     pub(crate) lost_else: u32,
-    /// How far clocks of those that stay were apart at most, in how many samples more than 100 ns, and of how many samples.
+    /// Greatest distance between clocks of those that stay, samples in which it was above 100 ns, and all samples.
     pub(crate) worst_ns: i64,
     pub(crate) apart: u64,
     pub(crate) samples: u64,
-    /// When they were so first.
+    /// The first of those samples.
     apart_at: Option<Instant>,
-    /// What happened up to then, the latest last.
+    /// Events up to then, the latest last.
     log: Vec<String>,
-    /// How far the clock of one that had just joined was off that of the first SubDevice.
+    /// Greatest distance of the clock of one that had just joined from that of the first SubDevice.
     pub(crate) newcomer_ns: i64,
     /// When tools were pulled.
     pulled: Vec<Instant>,
@@ -174,7 +174,7 @@ struct RingWithTools {
     observed: Observed,
     broken: Option<FaultId>,
     is_in: [bool; 3],
-    /// Where each tool is, or was last: the segment keeps the port of one that is out for it.
+    /// Place of each tool now, or its last one: the segment keeps the port of one that is out for it.
     last: [usize; 3],
 }
 

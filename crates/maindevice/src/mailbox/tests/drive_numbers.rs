@@ -7,7 +7,7 @@ use super::*;
 const SOE: u8 = 5;
 const DRIVE: u8 = 1;
 
-/// What a drive says to one request: bytes behind the mailbox header, one message after the other.
+/// Answers of a drive to one request: bytes behind the mailbox header, one message after the other.
 fn says(messages: &[&[u8]]) -> Scripted {
     let messages = messages.iter().map(|body| (SOE, body.to_vec())).collect();
     Scripted::with(vec![(SOE, Said::Several(messages))])
