@@ -177,7 +177,7 @@ impl SoftwareFaults {
         })
     }
 
-    /// What becomes of a fragment of an Ethernet frame that goes this way; `None`: nothing is wrong with it. Each call is
+    /// Fate of a fragment of an Ethernet frame that goes this way; `None`: nothing is wrong with it. Each call is
     /// one fragment: chance is drawn anew.
     pub fn spoils_fragment(&mut self, goes: FragmentWay) -> Option<FragmentTrouble> {
         self.0.iter_mut().find_map(|(software_fault, stream)| match software_fault {

@@ -10,7 +10,7 @@ use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use super::Segment;
 use crate::device::SignalId;
 
-/// Who sets the pace.
+/// Object of the choice which side sets the pace.
 const SYNC_SETTING: ObjectAddress = ObjectAddress { index: ObjectIndex(0x10F5), subindex: 1 };
 
 /// The two sides of a bridge, each a SubDevice of its segment.
@@ -25,7 +25,7 @@ pub struct BridgedSides {
 }
 
 impl BridgedSides {
-    /// What the bridge does at one moment: both segments have to have advanced to the same one.
+    /// Exchanges times and user data at one moment: both segments have to have advanced to the same one.
     pub fn exchange(&self, primary: &mut Segment, secondary: &mut Segment) {
         let now = primary.now;
         let time = |segment: &Segment, side: DeviceId| {

@@ -36,7 +36,7 @@ pub enum EthernetPortError {
         "`{place}`: the segment has no device `{device}`: expected a switch terminal with its port, such as S4.1"
     )]
     NoDevice {
-        /// What was asked for.
+        /// The port that was asked for.
         place: String,
         /// The device of it.
         device: String,
@@ -47,7 +47,7 @@ pub enum EthernetPortError {
          (`hosts`) and which was not named before, such as S4.1"
     )]
     NoPort {
-        /// What was asked for.
+        /// The port that was asked for.
         place: String,
     },
 }

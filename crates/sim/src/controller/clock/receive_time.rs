@@ -89,7 +89,7 @@ impl Core {
         }
     }
 
-    /// Whether a port keeps the time of a frame that this controller has not processed.
+    /// True if a port keeps the time of a frame that this controller has not processed.
     fn latches_passing(&self, port: Port, frame: &WireFrame) -> bool {
         let may = port != Port::A && !self.latches_next_frame() && frame.damage.is_intact();
         may && {
@@ -138,7 +138,7 @@ impl Core {
     }
 }
 
-/// Whether a frame writes to 0x0900 of the controller with this station address, by a command that latches.
+/// True if a frame writes to 0x0900 of the controller with this station address, by a command that latches.
 fn asks_for_receive_times(bytes: &[u8], station: StationAddress) -> bool {
     let Ok(view) = FrameView::parse(bytes) else { return false };
     view.datagrams().map_while(Result::ok).any(|datagram| {

@@ -14,7 +14,7 @@ const KNOWN: usize = 256;
 pub(super) struct BridgedPort {
     /// Its number, from 1.
     number: u8,
-    /// Who has sent something by it.
+    /// Hardware addresses that have sent something by it.
     known: BTreeSet<[u8; 6]>,
     from_outside: VecDeque<Vec<u8>>,
     to_outside: VecDeque<Vec<u8>>,

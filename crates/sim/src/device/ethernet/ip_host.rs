@@ -135,7 +135,7 @@ impl IpHost {
         self.client = Some(WebClient::new(&mut self.interface, &mut self.sockets, what, number));
     }
 
-    /// What the web page answered to [`IpHost::fetch`], without its head; `None` while it is not whole, empty where the
+    /// Answer of the web page to [`IpHost::fetch`], without its head; `None` while it is not whole, empty where the
     /// connection failed.
     #[must_use]
     pub fn fetched(&self) -> Option<&[u8]> {

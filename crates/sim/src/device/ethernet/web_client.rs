@@ -71,7 +71,7 @@ impl WebClient {
         any
     }
 
-    /// What follows the head of the answer, once all of it is there; nothing where there was no answer.
+    /// The answer behind its head, once all of it is there; nothing where there was no answer.
     pub(super) fn body(&self) -> Option<&[u8]> {
         let head = self.answer.windows(4).position(|four| four == b"\r\n\r\n").map(|at| at + 4);
         self.is_over.then(|| self.answer.get(head?..)).flatten().or(self.is_over.then_some(&[]))

@@ -49,7 +49,7 @@ impl EoePort {
         Self { side: self.side, left_out: self.left_out, ..Self::default() }
     }
 
-    /// Where frames go.
+    /// The IP stack or switch that frames go to.
     pub(super) const fn side(&self) -> Option<&EthernetSide> {
         self.side.as_ref()
     }

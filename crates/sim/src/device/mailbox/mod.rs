@@ -105,7 +105,7 @@ impl Mailbox {
         self.eoe.connect(side);
     }
 
-    /// Where frames of EoE go; `None`: nowhere.
+    /// The IP stack or switch that frames of EoE go to; `None`: there is none.
     #[must_use]
     pub const fn ethernet(&self) -> Option<&EthernetSide> {
         self.eoe.side()
