@@ -96,7 +96,7 @@ pub fn wait_for<const N: usize>(
     ended(poll(&mut polled, left.as_ref()), || waited.map(|one| one.name).join("+"))
 }
 
-/// How a wait for the interfaces of these names ended.
+/// Outcome of a wait for the interfaces of these names.
 fn ended(
     polled: rustix::io::Result<usize>,
     names: impl FnOnce() -> String,
