@@ -239,7 +239,7 @@ impl Clock {
     }
 }
 
-/// Whether a port of a controller of a ring leads to the next one of it, or to card B.
+/// True if a port of a controller of a ring leads to the next one of it, or to card B.
 fn leads_on(tree: &Tree, node: usize, port: Port) -> bool {
     tree.link_at(End::Controller(node, port))
         .is_some_and(|link| tree.is_on_ring(link) && port != tree.entry(node))
