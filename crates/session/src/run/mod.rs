@@ -22,7 +22,7 @@ use crate::session::SessionHooks;
 /// seconds.
 pub const SCAN_PATIENCE: Span = Span::s(60);
 
-/// So often a network looks whether those that lead it have begun.
+/// Interval at which a network looks for those that lead it to have begun.
 const GROUP_POLL: Span = Span::ms(1);
 
 /// Plan that is to be run.
