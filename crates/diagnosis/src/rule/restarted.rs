@@ -20,6 +20,7 @@
 //! at these moments.
 
 mod card;
+mod links;
 mod supply;
 mod terminal_bus;
 mod unseen;
@@ -36,7 +37,6 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::locate::LinkLosses;
 use crate::model::{AlChange, AlError, Device, NetworkModel, Seen, is_on_terminal_bus};
 
 /// Back in INIT.
@@ -151,7 +151,7 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             .copied()
             .collect();
         conditions.push(if fall.is_restart {
-            restarted(model, fall, &together)
+            restarted(model, fall, &together, &falls)
         } else {
             fell(model, fall)
         });
@@ -251,7 +251,12 @@ fn shortest_outage(model: &NetworkModel) -> Option<Span> {
         .min()
 }
 
-fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Condition {
+fn restarted(
+    model: &NetworkModel,
+    fall: &Fall<'_>,
+    together: &[Fall<'_>],
+    falls: &[Fall<'_>],
+) -> Condition {
     let device = fall.device;
     let is_several = together.len() > 1;
     let is_first = together.iter().all(|other| device.id <= other.device.id);
@@ -259,7 +264,9 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
         Some(away) => away >= DIP,
         None => together.iter().any(|one| one.was_long(model, together)),
     };
-    let feeder = is_first.then(|| terminal_bus::common_feeder(model, together)).flatten();
+    let common_feeder = is_first.then(|| terminal_bus::common_feeder(model, together)).flatten();
+    // Without its load the voltage of an overloaded bus is back at once: it dips, again and again.
+    let feeder = common_feeder.filter(|_| !was_long);
     let (cause, others) = match (was_long, is_several) {
         _ if feeder.is_some() => {
             (FaultName::EbusOverload, [(FaultName::BrownOut, 0.2), (FaultName::SupplyOff, 0.1)])
@@ -282,7 +289,10 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     for (cause, confidence) in others {
         condition = condition.or(cause, confidence);
     }
-    if feeder.is_none() && is_on_terminal_bus(model, device.id.index()) {
+    if let Some(overloaded) = common_feeder.filter(|_| feeder.is_none()) {
+        let overloaded = Place::device(model.network, overloaded);
+        condition = condition.or_at(FaultName::EbusOverload, overloaded, 0.1);
+    } else if feeder.is_none() && is_on_terminal_bus(model, device.id.index()) {
         // Terminals that lose the voltage of the E-bus start anew, whatever took it.
         condition = condition.or(FaultName::EbusOverload, 0.05);
     }
@@ -299,7 +309,7 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     if is_first {
         let mut follows = BTreeSet::new();
         for other in together {
-            follows.extend(consequences(model, other, together));
+            follows.extend(consequences(model, other, together, falls));
             if other.device.id != device.id {
                 follows.insert(Symptom::StateLost(other.device.id));
             }
@@ -308,7 +318,7 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
     } else {
         condition = condition
             .about([Symptom::StateLost(device.id)])
-            .explaining(consequences(model, fall, together));
+            .explaining(consequences(model, fall, together, falls));
     }
     if is_back(fall)
         && let Some(status) = device.al.status
@@ -337,9 +347,14 @@ fn restarted(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Co
 }
 
 /// All that a device without power brings about.
-fn consequences(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Vec<Symptom> {
+fn consequences(
+    model: &NetworkModel,
+    fall: &Fall<'_>,
+    together: &[Fall<'_>],
+    falls: &[Fall<'_>],
+) -> Vec<Symptom> {
     let id = fall.device.id;
-    let mut follows = links_lost_with(model, fall, together);
+    let mut follows = links::lost_with(model, fall, together, falls);
     let own = [Symptom::Silent(id), Symptom::WorkingCounter(id), Symptom::Emergency(id)];
     follows.extend(own);
     follows.extend(out_of_step(model, fall.device));
@@ -386,62 +401,6 @@ fn out_of_step(model: &NetworkModel, device: &Device) -> Vec<Symptom> {
             && errors.iter().all(|error| is_timing(error) && is_then(error))
     });
     lost.map(|other| Symptom::StateLost(other.id)).collect()
-}
-
-/// What follows from a restart at the links of the device: without supply it has no link, so its
-/// neighbours lose theirs. Not so where a link was lost more often than the device restarted, at
-/// another time, or is down though the device has been back for long.
-fn links_lost_with(model: &NetworkModel, fall: &Fall<'_>, together: &[Fall<'_>]) -> Vec<Symptom> {
-    let Some(tree) = &model.tree else { return Vec::new() };
-    let device = fall.device;
-    let falls: Vec<_> = device.al.changes.iter().filter(|change| change.is_own_fall()).collect();
-    let earliest = match falls.as_slice() {
-        [first, _, ..] => first.at.before(BEFORE),
-        // Those whose supply went together lost their links together, whenever each was missed.
-        [] | [_] => together.iter().map(Fall::began).fold(fall.began(), Instant::min),
-    };
-    // Of a device that has just come back some links are up, and others on their way.
-    let is_coming_up = model.now < fall.change.at + link_lost::SLOWEST_LINK_UP;
-    let mut follows = Vec::new();
-    for drops in LinkLosses::all(model) {
-        let link = tree.links()[drops.link];
-        let ends = [link.upstream, link.downstream];
-        let is_its = ends.iter().any(|end| end.node() == Some(device.id.index()));
-        // One that starts anew again and again before it is up has no state to fall from.
-        let was_never_up = falls.first().is_some_and(|first| stays_down(device, first, drops.last));
-        let is_then = drops.first + TOGETHER >= earliest
-            && (drops.last <= fall.change.at + LINKS_COUNTED || was_never_up)
-            && (!drops.is_down || (is_coming_up && drops.first <= earliest + TOGETHER));
-        let is_as_often = drops.count <= falls.len() as u64
-            || was_never_up
-            || was_away_at_each(device, &drops, falls.len());
-        if is_its && is_then && is_as_often {
-            follows.extend(link_lost::follows(model, tree, drops.link));
-        }
-    }
-    follows
-}
-
-/// Whether each loss lies in one of the times in which the device was away, and it fell nearly each time: one
-/// that falls again before it answers was away for both.
-fn was_away_at_each(device: &Device, drops: &LinkLosses, falls: usize) -> bool {
-    let is_in = |at: Instant| {
-        device.absences.iter().any(|absence| {
-            absence.since.at.before(TOGETHER) <= at
-                && absence.ended.is_none_or(|ended| at <= ended + TOGETHER)
-        })
-    };
-    !drops.seen.is_empty()
-        && drops.count <= drops.seen.len() as u64
-        && drops.seen.iter().all(|drop| is_in(drop.at))
-        && falls * 10 >= device.absences.len() * 8
-}
-
-/// Whether a device was not seen in its former state again between a fall and `until`.
-fn stays_down(device: &Device, fall: &AlChange, until: Instant) -> bool {
-    let later = device.al.changes.iter().filter(|change| change.at > fall.at && change.at <= until);
-    let before = fall.from.state().state();
-    later.into_iter().all(|change| change.to.state().state() < before)
 }
 
 fn fell(model: &NetworkModel, fall: &Fall<'_>) -> Condition {
