@@ -33,8 +33,13 @@ impl ErrorWalk<'_, '_> {
         }
         let counted = self.counting_times(route)?;
         let begin = model.traffic.recording.first()?;
-        let times = model.traffic.losses.times().iter().copied();
+        let losses = &model.traffic.losses;
+        // In a ring one of two copies is lost at a time.
+        let are_copies = losses.copies(card).of_spell() > losses.frames().of_spell();
+        let times = if are_copies { losses.copy_times(card) } else { losses.times() };
         let mut lost: Vec<Instant> = times
+            .iter()
+            .copied()
             .filter(|at| {
                 *at >= model.spell_began && *at <= self.horizon && *at >= begin + COMING_UP
             })

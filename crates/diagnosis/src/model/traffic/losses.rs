@@ -19,6 +19,7 @@ pub struct LostFrames {
     latest: Option<Seen<()>>,
     times: VecDeque<Instant>,
     copies: [Tally; 2],
+    copy_times: [VecDeque<Instant>; 2],
     copies_gone: Tally,
     damaged: Tally,
     silences: VecDeque<Silence>,
@@ -46,10 +47,7 @@ impl LostFrames {
         if !by_order {
             self.frames.add(1, seen.at);
             if row.is_none() {
-                if self.times.len() == LOST_KEPT {
-                    self.times.pop_front();
-                }
-                self.times.push_back(seen.at);
+                note(&mut self.times, seen.at);
             }
             self.first.get_or_insert(seen);
             self.latest = Some(seen);
@@ -96,6 +94,7 @@ impl LostFrames {
     /// Of a request that was sent at `at` the copy of one card came back, and not the one to this card.
     pub fn record_copy(&mut self, card: Path, at: Instant) {
         self.copies[card.index()].add(1, at);
+        note(&mut self.copy_times[card.index()], at);
     }
 
     /// In a ring that was whole before, one copy alone came back of a request that was sent at `at`.
@@ -147,6 +146,12 @@ impl LostFrames {
         self.copies[card.index()]
     }
 
+    /// When those were sent whose copy did not come to `card`, in the order in which that was known, at most [`LOST_KEPT`].
+    #[must_use]
+    pub const fn copy_times(&self, card: Path) -> &VecDeque<Instant> {
+        &self.copy_times[card.index()]
+    }
+
     /// In a ring that was whole before, frames of which one copy alone came back, with none after them of which both
     /// did: some of them at least.
     #[must_use]
@@ -172,4 +177,12 @@ impl LostFrames {
     pub const fn swallowed(&self) -> &VecDeque<Silence> {
         &self.swallowed
     }
+}
+
+/// Keeps a time, and forgets the oldest where there are too many.
+fn note(times: &mut VecDeque<Instant>, at: Instant) {
+    if times.len() == LOST_KEPT {
+        times.pop_front();
+    }
+    times.push_back(at);
 }
