@@ -237,7 +237,7 @@ fn probe_ports(model: &NetworkModel) -> Vec<ProbePortReport> {
         port: port.number,
         channel: port.number / 2,
         is_way_back: order.is_back(port.number),
-        subdevices_before: port.before(),
+        subdevices_before: order.before(port.number),
         place: port_place(model, port.number),
         frames: Number(port.frames),
         damaged: Number(port.damaged),

@@ -69,9 +69,11 @@ impl Engine {
         model.host.is_watched = setup.host_counters;
         model.sees_all_orders = setup.input == InputKind::Driven;
         model.reported.exchanges.clone_from(&setup.exchanges);
+        let mut watched = NetworkWatch::new(model);
+        watched.capture_probe.tell_places(&setup.tap_places);
         Self {
             setup,
-            networks: vec![NetworkWatch::new(model)],
+            networks: vec![watched],
             book: FindingStore::default(),
             events: VecDeque::new(),
             probes: VecDeque::new(),

@@ -33,6 +33,9 @@ pub struct Setup {
     pub start: Option<String>,
     /// The clock behind the times.
     pub clock: String,
+    /// SubDevices before each channel of a tap that recorded network 0 inside the line, channel 0 first; empty where the
+    /// recording has none, or records of a probe that tell.
+    pub tap_places: Vec<u16>,
     /// Parts that were exchanged before, on account of an earlier diagnosis, of network 0.
     pub exchanges: Vec<PartExchange>,
 }

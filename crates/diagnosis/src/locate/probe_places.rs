@@ -16,6 +16,8 @@ pub enum ProbeSign {
     FewMarked,
     /// Not there any more.
     Lost,
+    /// Not there any more at a tap: lost, or damaged, since its cards drop damaged frames.
+    Missing,
 }
 
 /// The hop on which a port of the probe sits; `None` where the recording does not tell.
@@ -23,7 +25,7 @@ pub enum ProbeSign {
 pub fn hop_of(record: &ProbeRecord, tree: &Tree, route: &Route, port: u8) -> Option<usize> {
     let is_back = record.order.is_back(port);
     let out = if is_back { port ^ 1 } else { port };
-    let before = usize::from(record.port(out)?.before()?);
+    let before = usize::from(record.order.before(out)?);
     let node = *tree.order().get(before)?;
     let hop = route.first_hop_to(node)?;
     if is_back { route.opposite(hop) } else { Some(hop) }
@@ -46,7 +48,7 @@ pub fn places(
     let found = match sign {
         ProbeSign::Fresh => places_of(std::slice::from_ref(own), true),
         ProbeSign::Marked if !before.is_empty() => places_of(before, from.is_none()),
-        ProbeSign::Marked | ProbeSign::FewMarked | ProbeSign::Lost => {
+        ProbeSign::Marked | ProbeSign::FewMarked | ProbeSign::Lost | ProbeSign::Missing => {
             places_of(hops, from.is_none())
         }
     };

@@ -60,7 +60,7 @@ impl ProbeRecord {
     #[must_use]
     pub fn inside(&self) -> Option<u8> {
         let first = self.order.ports().first().filter(|_| self.order.len() > 1)?;
-        (first.before() != Some(0)).then_some(first.number)
+        (self.order.before(first.number) != Some(0)).then_some(first.number)
     }
 
     /// A port.

@@ -9,6 +9,9 @@
 //! between the two, whatever any counter says. A SubDevice that finds a frame bad adds an odd nibble, which the probe
 //! tells as an alignment error: a bad frame without it became bad after the last SubDevice, with it before that one.
 //!
+//! A tap inside the line adds no record, and its cards drop damaged frames: `linesman diagnose FILE --probe LINK` says
+//! where it sits, and a frame that passed it on its way out and not on its way back was damaged or lost behind it.
+//!
 //! **What it means.** One of the links or devices between the two ports damages frames or loses them, in the
 //! direction that is named. All of them are possible; where error counters were read, they narrow it, and the finding
 //! of that link says what the probe saw. Nothing is said of what lies behind the last port on the way.
@@ -59,11 +62,12 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
             0..=FEW => ProbeSign::FewMarked,
             _ => ProbeSign::Marked,
         };
-        let kinds = [
-            (ProbeSign::Fresh, section.fresh),
-            (marked, section.marked),
-            (ProbeSign::Lost, section.lost),
-        ];
+        let (fresh, lost) = match view.model.capture_probe.order.is_tap() {
+            // Its cards do not tell whether a controller has found the frame bad.
+            true => (ProbeSign::FewMarked, ProbeSign::Missing),
+            false => (ProbeSign::Fresh, ProbeSign::Lost),
+        };
+        let kinds = [(fresh, section.fresh), (marked, section.marked), (lost, section.lost)];
         for (sign, tally) in kinds {
             add(view, section, sign, tally, conditions);
         }
@@ -120,7 +124,7 @@ fn add(
         });
     }
     condition.severity = match (sign, count) {
-        (ProbeSign::Lost, 1) => Severity::Info,
+        (ProbeSign::Lost | ProbeSign::Missing, 1) => Severity::Info,
         (ProbeSign::Lost, _) | (_, 1) => Severity::Warning,
         (_, _) => Severity::Error,
     };
@@ -207,7 +211,7 @@ fn add_link_before_probe(view: &View<'_>, conditions: &mut [Condition]) {
     let Some(first) = record.order.ports().first().filter(|_| record.order.len() > 1) else {
         return;
     };
-    if first.before() != Some(0) {
+    if record.order.before(first.number) != Some(0) {
         return;
     }
     let tree = model.tree.as_ref();
@@ -302,6 +306,10 @@ fn text(
                 "{count} of {of} frames {undamaged} {from} and not to {to}: they were lost between the two"
             )
         }
+        ProbeSign::Missing => format!(
+            "{count} of {of} frames came to {from} and not to {to}: they were damaged or lost between the two (a \
+             card drops damaged frames)"
+        ),
         ProbeSign::Fresh => format!(
             "{count} of {of} frames had a wrong check sequence at {to}, and {undamaged} {from}; no SubDevice had \
              marked them as bad: they became bad behind the last SubDevice, on the link of this port or in what \
@@ -324,7 +332,10 @@ fn from_text(model: &NetworkModel, port: Option<u8>) -> String {
 
 /// A port of the probe with its place: `port 2 of the probe (on the link to SubDevice 5, on the way out)`.
 fn port_text(model: &NetworkModel, port: u8) -> String {
-    format!("port {port} of the probe ({})", port_place(model, port))
+    match model.capture_probe.order.is_tap() {
+        true => format!("the tap {}", port_place(model, port)),
+        false => format!("port {port} of the probe ({})", port_place(model, port)),
+    }
 }
 
 /// The place of a port of the probe: `on the link to SubDevice 5, on the way out`.
@@ -358,6 +369,13 @@ fn advise(
              range is left."
         )),
         1 | 2 => condition,
+    };
+    let condition = match model.capture_probe.order.is_tap() {
+        true => condition.advise(
+            "Look whether the computer that recorded has lost frames itself (`capinfos`, drops of its cards): that looks \
+             the same.",
+        ),
+        false => condition,
     };
     condition
         .advise("Read the error counters (0x0300 to 0x0313) of the SubDevices in the range: they name the link.")

@@ -124,6 +124,7 @@ impl Lab {
             },
             start: None,
             clock: "virtual".to_owned(),
+            tap_places: Vec::new(),
             exchanges: options.exchanges.clone(),
         };
         let mut settings = Options::default();

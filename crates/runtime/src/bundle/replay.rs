@@ -26,6 +26,7 @@ impl Bundle {
             source: self.name.display().to_string(),
             start: manifest.start.clone(),
             clock: manifest.clock.clone(),
+            tap_places: Vec::new(),
             exchanges: Vec::new(),
         }
     }

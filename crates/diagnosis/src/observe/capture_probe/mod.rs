@@ -11,6 +11,7 @@
 mod passage;
 mod port;
 mod request;
+pub mod tap;
 
 use std::collections::VecDeque;
 
@@ -77,6 +78,11 @@ impl ProbePassages {
         Self { reach: ProbeReach::of_plan(is_planned), ..Self::default() }
     }
 
+    /// Tells how many SubDevices lie before each channel, channel 0 first, of a tap that adds no records of its own.
+    pub fn tell_places(&mut self, before: &[u16]) {
+        self.order.tell_places(before);
+    }
+
     /// Takes a copy that came to a port of the probe.
     pub fn take(
         &mut self,
@@ -127,7 +133,7 @@ impl ProbePassages {
         }
         if self.order.len() < 2 || are_lines_of_their_own(&held) {
             self.use_of_ports = UseOfPorts::Apart;
-            self.order = PortOrder::default();
+            self.order = self.order.without_ports();
             held.iter().for_each(|copy| out(ProbeOutput::Frame(copy.seen(Default::default()))));
             return;
         }

@@ -5,6 +5,7 @@ use linesman_proto::esl::{EslRecord, PORTS};
 use linesman_proto::frame::FrameView;
 use linesman_proto::time::Instant;
 
+use super::tap::CHANNELS;
 use crate::observe::FrameSeen;
 
 /// Most different numbers of SubDevices that are told apart at a port.
@@ -42,6 +43,8 @@ pub struct PortOrder {
     ports: Vec<ProbePort>,
     /// By two ports: how often the same frame came to the one before the other.
     votes: [[u32; PORTS as usize]; PORTS as usize],
+    /// By channel: SubDevices before it, as the user says of a tap that adds no records.
+    told: [Option<u16>; CHANNELS as usize],
 }
 
 impl PortOrder {
@@ -83,10 +86,29 @@ impl PortOrder {
         self.port(other).is_some() && self.rank(other) < self.rank(number)
     }
 
-    /// SubDevices before a port.
+    /// SubDevices before a port: as the user says of the way out of a tap, else as broadcasts tell.
     #[must_use]
     pub fn before(&self, number: u8) -> Option<u16> {
-        self.port(number)?.before()
+        let told = self.told.get(usize::from(number / 2)).copied().flatten();
+        told.filter(|_| !self.is_back(number)).or_else(|| self.port(number)?.before())
+    }
+
+    /// True for a tap of which the user says where it sits: its cards add no records, and drop damaged frames.
+    #[must_use]
+    pub fn is_tap(&self) -> bool {
+        self.told.iter().any(Option::is_some)
+    }
+
+    /// Tells how many SubDevices lie before each channel, channel 0 first.
+    pub(super) fn tell_places(&mut self, before: &[u16]) {
+        for (told, before) in self.told.iter_mut().zip(before) {
+            *told = Some(*before);
+        }
+    }
+
+    /// What the user says, without what was seen.
+    pub(super) fn without_ports(&self) -> Self {
+        Self { told: self.told, ..Self::default() }
     }
 
     /// Counts a frame at a port.
