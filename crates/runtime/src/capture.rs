@@ -1,6 +1,8 @@
 //! A capture as the diagnosis sees it: frames in the order of the file, in times of the run. The files of one ring of files
 //! are one capture, and so are those that were recorded side by side, as at both cards of a ring.
 
+mod tap;
+
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +16,8 @@ use linesman_link::unix_time::UnixTime;
 use linesman_proto::address::Network;
 use linesman_proto::time::{Instant, Span};
 
+pub use self::tap::{CaptureTap, TapFault, TapPlace};
+
 /// Longest time after the last frame that a recorder is believed to have recorded nothing.
 const LONGEST_SILENCE: Span = Span::s(86_400);
 
@@ -22,6 +26,8 @@ pub struct Capture {
     source: FrameSource,
     clock: RunClock,
     files: RecordingFiles,
+    /// Where it was recorded inside the line by cards that add no records.
+    tap: Option<CaptureTap>,
 }
 
 /// Reader of the present file, or of all files that were recorded side by side.
@@ -101,7 +107,7 @@ impl Capture {
         let clock = first.map_or_else(RunClock::default, RunClock::starting_at);
         let source = FrameSource::Merged(MergedCaptures::open(paths)?);
         let files = RecordingFiles { count: 1, ..RecordingFiles::default() };
-        Ok(Self { source, clock, files })
+        Ok(Self { source, clock, files, tap: None })
     }
 
     /// Reads a capture from an input. Of a file the run begins with the earliest frame of any
@@ -117,7 +123,19 @@ impl Capture {
         let is_file = input.is_file();
         let source = FrameSource::of(CaptureReader::of(input)?, is_file);
         let files = RecordingFiles { count: 1, ..RecordingFiles::default() };
-        Ok(Self { source, clock, files })
+        Ok(Self { source, clock, files, tap: None })
+    }
+
+    /// The same capture, recorded by a tap inside the line.
+    #[must_use]
+    pub fn by_tap(self, tap: CaptureTap) -> Self {
+        Self { tap: Some(tap), ..self }
+    }
+
+    /// Contradiction between what was read and what was said of the tap; known at the end.
+    #[must_use]
+    pub fn tap_fault(&self) -> Option<TapFault> {
+        self.tap.as_ref()?.fault(&self.files.interfaces)
     }
 
     /// The share that has been read, 0 to 1; `None` where nobody knows the whole.
@@ -139,7 +157,7 @@ impl Capture {
         while !self.source.advance() {
             self.source = self.files.after(&self.source)?;
         }
-        let Self { source, clock, files } = self;
+        let Self { source, clock, files, tap } = self;
         if source.interfaces().len() > files.numbers.len() {
             files.describe(source.interfaces());
         }
@@ -148,7 +166,7 @@ impl Capture {
         captured.interface = files.number(captured.interface);
         let at = clock.place(captured.interface, captured.time).at;
         let interface = files.interfaces.get(captured.interface.0 as usize)?;
-        let seen = FrameSeen {
+        let mut seen = FrameSeen {
             network: Network::default(),
             path: None,
             direction: direction(captured.direction),
@@ -159,6 +177,9 @@ impl Capture {
             probe: captured.probe,
             bytes: captured.bytes,
         };
+        if let Some(tap) = tap {
+            seen.probe = tap.record(captured.interface, interface, &seen);
+        }
         Some(CaptureItem { captured, seen, interface })
     }
 
