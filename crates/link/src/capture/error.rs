@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::{CaptureFormat, Damage};
-use crate::input::{InputError, InputErrorKind};
+use crate::input::{InputError, InputErrorKind, STANDARD_INPUT};
 use crate::unix_time::UnixTime;
 
 /// A capture that cannot be read at all: not even its first block.
@@ -22,6 +22,11 @@ pub struct CaptureError {
 
 impl CaptureError {
     pub(super) fn at_start(file: &Path, kind: CaptureErrorKind) -> Self {
+        let is_pipe = file.as_os_str() == STANDARD_INPUT;
+        let kind = match kind {
+            CaptureErrorKind::Empty if is_pipe => CaptureErrorKind::NothingPiped,
+            other => other,
+        };
         Self { file: file.to_path_buf(), offset: 0, kind }
     }
 }
@@ -45,6 +50,12 @@ pub enum CaptureErrorKind {
          that was killed may not have written what it held"
     )]
     Empty,
+    /// A pipe ended before anything came.
+    #[error(
+        "standard input ended before anything came, expected a pcapng or pcap capture. Do: look whether the command \
+         before the pipe failed, such as `tcpdump -i eth0 -U -w -` without its rights"
+    )]
+    NothingPiped,
     /// It begins like no capture.
     #[error(
         "at byte 0: expected the first bytes of a capture (pcapng: 0a 0d 0d 0a; pcap: d4 c3 b2 a1, \
