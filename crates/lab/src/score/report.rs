@@ -222,6 +222,9 @@ pub struct HealthyReport {
     pub per_1000_hours_at_most: Option<f64>,
     /// What they were accused of.
     pub alarms: Vec<String>,
+    /// Accusations by the recordings alone, beside those of the live diagnosis; empty where recordings alone are
+    /// judged.
+    pub alarms_capture: Vec<String>,
 }
 
 /// Faults that acted so often.

@@ -6,7 +6,7 @@ use linesman_config::fault::FaultName;
 use linesman_proto::time::Span;
 
 use super::case::{CaseKind, ScoreOptions};
-use super::judge::Judged;
+use super::judge::{Accusations, Judged};
 use super::listen::tally::ListenTally;
 use super::outcome::{CaseReport, FaultOutcome};
 use super::rate::{Count, rounded};
@@ -182,6 +182,7 @@ pub struct Tally {
     healthy_for: Span,
     findings_of_healthy: [u64; 2],
     alarms: Vec<String>,
+    alarms_capture: Vec<String>,
     single: Group,
     masked: Group,
     without_forwarded: Group,
@@ -235,8 +236,14 @@ impl Tally {
             for (sum, one) in self.findings_of_healthy.iter_mut().zip([said, capture]) {
                 *sum += (one.alarms.len() + one.notes.len()) as u64;
             }
-            for alarm in said.alarms.iter().chain(&said.notes) {
-                self.alarms.push(format!("seed {}: {alarm}", case.seed));
+            let seed = case.seed;
+            let alarms = |said: &Accusations| -> Vec<String> {
+                let all = said.alarms.iter().chain(&said.notes);
+                all.map(|alarm| format!("seed {seed}: {alarm}")).collect()
+            };
+            self.alarms.extend(alarms(said));
+            if self.options.judges_live() {
+                self.alarms_capture.extend(alarms(capture));
             }
         }
         self.listened.add_healthy(case);
@@ -402,6 +409,7 @@ impl Tally {
                 per_1000_hours: per_1000_hours(self.findings_of_healthy[0] as f64, hours),
                 per_1000_hours_at_most: per_1000_hours(at_most(self.findings_of_healthy[0]), hours),
                 alarms: self.alarms.clone(),
+                alarms_capture: self.alarms_capture.clone(),
             },
             by_effects: EFFECTS
                 .iter()

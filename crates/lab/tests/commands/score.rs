@@ -82,6 +82,34 @@ fn a_healthy_line_that_is_disturbed_is_not_accused() {
 }
 
 #[test]
+fn false_alarms_of_recordings_stand_beside_the_live_ones() {
+    for capture_only in [false, true] {
+        let options = ScoreOptions { healthy: true, capture_only, ..ScoreOptions::default() };
+        let mut case = run_case(3, &options);
+        let [live, recorded] = case.healthy.as_mut().unwrap();
+        live.alarms.push("H110 of the live one".to_owned());
+        recorded.alarms.push("H110 of the recording".to_owned());
+        recorded.notes.push("X505 of the recording".to_owned());
+        let mut tally = Tally::new(options);
+        tally.add(&case);
+        let report = tally.report().healthy;
+        let recorded =
+            ["seed 3: H110 of the recording", "seed 3: X505 of the recording"].map(str::to_owned);
+        match capture_only {
+            false => {
+                assert_eq!(report.alarms, ["seed 3: H110 of the live one"]);
+                assert_eq!(report.alarms_capture, recorded);
+            }
+            // Then they are the ones that are judged, and told once.
+            true => {
+                assert_eq!(report.alarms, recorded);
+                assert!(report.alarms_capture.is_empty(), "{:?}", report.alarms_capture);
+            }
+        }
+    }
+}
+
+#[test]
 fn a_perturbed_plant_is_judged_like_any_other() {
     for perturb in Perturbation::ALL {
         let options = ScoreOptions { perturb: Some(perturb), ..ScoreOptions::default() };

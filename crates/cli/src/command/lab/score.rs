@@ -65,7 +65,7 @@ pub(crate) struct Arguments {
     /// even the upper end of the 95 % interval lies below
     #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(1..=100))]
     floor: Option<u8>,
-    /// Also each case that was judged wrongly, with what was said
+    /// Also each case that was judged wrongly, with what was said, and the false alarms in recordings of healthy lines
     #[arg(long)]
     list: bool,
     /// JSON, schema linesman.score/2

@@ -38,6 +38,9 @@ pub(super) fn show(report: &ScoreReport, list: bool, output: &mut Output) {
         output.line(&format!("not played, {why}"));
     }
     if list {
+        for alarm in &report.healthy.alarms_capture {
+            output.line(&format!("false alarm in the recording, {alarm}"));
+        }
         for wrong in &report.wrong {
             one_wrong(wrong, output);
         }
