@@ -4,11 +4,14 @@
 //! recording is said to show is held against the truth by places along the way of the frames: the true place must be
 //! in the range that a finding names, and the range may be no wider than the ports of the probe allow.
 
+mod way;
+
 use std::sync::PoisonError;
 
 use linesman_config::fault::FaultName;
 use linesman_diagnosis::FrameSeen;
 use linesman_diagnosis::observe::Direction;
+use linesman_diagnosis::observe::capture_probe::tap::TapWays;
 use linesman_diagnosis::report::{Diagnosis, FindingReport, Severity};
 use linesman_proto::address::{DeviceId, Network};
 use linesman_proto::command::{Addressing, Command};
@@ -16,15 +19,15 @@ use linesman_proto::ethernet;
 use linesman_proto::frame::{DATAGRAM_HEADER_LEN, ETHERCAT_HEADER_LEN, WKC_LEN};
 use linesman_proto::register::ErrorCounters;
 use linesman_proto::time::{Instant, Span};
-use linesman_proto::topology::{End, Hop, Route, Tree};
+use linesman_proto::topology::{End, Route};
 use linesman_sim::seed::{Seed, Stream};
 
+use self::way::{ProbedWay, Spot};
 use super::built_in::EarlyEnd;
 use super::case::{Case, ScoreOptions};
 use super::play::{Active, BRING_UP, CALM, Play};
+use crate::verdict::Truth;
 use crate::verdict::claim::Claim;
-use crate::verdict::site::{Site, Way};
-use crate::verdict::{Truth, TruthPlace};
 
 /// Faults of the signal, and of what carries it.
 pub const FAULTS: [FaultName; 10] = [
@@ -59,7 +62,8 @@ pub struct ProbeCaseReport {
     pub devices: usize,
     /// The plugs at which the probe sat.
     pub places: Vec<String>,
-    /// Copies that the probe has recorded, and the damaged ones of them.
+    /// Copies that the probe has recorded, and the damaged ones of them; of a tap, which drops those, the frames that came
+    /// damaged to some port, and undamaged to the first one.
     pub copies: [u64; 2],
     /// Judgement of the diagnosis.
     pub outcome: ProbeOutcome,
@@ -84,9 +88,18 @@ pub enum ProbeOutcome {
     Wrong(String),
 }
 
+/// What records the frames.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ProbeKind {
+    /// A probe that adds a record to each frame, and keeps damaged ones.
+    Recording,
+    /// The cards of a tap of which the links are told: no records, and damaged frames are dropped.
+    Tap,
+}
+
 /// Plays the case of a seed with a capture probe.
 #[must_use]
-pub fn run_probe_case(seed: u64) -> ProbeCaseReport {
+pub fn run_probe_case(seed: u64, kind: ProbeKind) -> ProbeCaseReport {
     let mut stream = Seed(seed).stream("capture probe case");
     let is_healthy = stream.below(HEALTHY_EVERY) == 0;
     let fault = stream.pick(&FAULTS).copied().filter(|_| !is_healthy);
@@ -110,7 +123,7 @@ pub fn run_probe_case(seed: u64) -> ProbeCaseReport {
         }
         case.background = None;
         let Ok(play) = Play::new(&case, &options) else { continue };
-        match (ProbePlay { play, probes: Vec::new() }).run(&mut report, &mut stream) {
+        match (ProbePlay { play, kind, probes: Vec::new() }).run(&mut report, &mut stream) {
             Ok(outcome) => {
                 report.outcome = outcome;
                 break;
@@ -128,6 +141,7 @@ pub fn run_probe_case(seed: u64) -> ProbeCaseReport {
 /// A case that is being played with a probe.
 struct ProbePlay<'a> {
     play: Play<'a>,
+    kind: ProbeKind,
     /// The plugs of the channels.
     probes: Vec<End>,
 }
@@ -192,16 +206,25 @@ impl ProbePlay<'_> {
     fn judge(&mut self, copies: &mut [u64; 2]) -> Diagnosis {
         let recording = std::sync::Arc::clone(&self.play.recording);
         let mut engine = recording.lock().unwrap_or_else(PoisonError::into_inner);
+        let tap_places = match self.kind {
+            ProbeKind::Recording => Vec::new(),
+            ProbeKind::Tap => self.probes.iter().filter_map(|end| self.before(*end)).collect(),
+        };
         *engine = linesman_diagnosis::Engine::new(linesman_diagnosis::Setup {
             clock: "virtual".to_owned(),
+            tap_places,
             ..Default::default()
         });
+        let mut ways = TapWays::default();
+        let mut damaged = [0_u64; linesman_proto::esl::PORTS as usize];
         let mut bytes = Vec::new();
         while let Some(seen) = self.play.lab.poll_probe_frame(&mut bytes) {
             copies[0] += 1;
             hide_counters(&mut bytes);
-            copies[1] += u64::from(seen.record.is_damaged());
-            engine.handle_frame(&FrameSeen {
+            if let Some(port) = seen.record.port.filter(|_| seen.record.is_damaged()) {
+                damaged[usize::from(port)] += 1;
+            }
+            let seen_as_recorded = FrameSeen {
                 network: Network::default(),
                 path: None,
                 direction: Direction::Unknown,
@@ -211,10 +234,45 @@ impl ProbePlay<'_> {
                 truncated: false,
                 probe: Some(seen.record),
                 bytes: &bytes,
-            });
+            };
+            match self.kind {
+                ProbeKind::Recording => engine.handle_frame(&seen_as_recorded),
+                ProbeKind::Tap if seen.record.is_damaged() => {}
+                ProbeKind::Tap => {
+                    let mut frame = FrameSeen { probe: None, ..seen_as_recorded };
+                    let port = seen.record.port.unwrap_or(0);
+                    frame.probe = Some(ways.record(port / 2, u32::from(port), &frame));
+                    engine.handle_frame(&frame);
+                }
+            }
         }
+        copies[1] = match self.kind {
+            ProbeKind::Recording => damaged.iter().sum(),
+            // What comes damaged to the first port was never whole at a tap, and shows nowhere.
+            ProbeKind::Tap => {
+                let most = damaged.iter().max().copied().unwrap_or(0);
+                most.saturating_sub(damaged[self.first_port()])
+            }
+        };
         engine.finish(Instant::ZERO, true);
         engine.diagnosis()
+    }
+
+    /// The port of the probe to which frames come first.
+    fn first_port(&self) -> usize {
+        let route = Route::intact(self.play.lab.tree());
+        let hop =
+            |end: &End| route.hops().iter().position(|hop| hop.from == *end || hop.to == *end);
+        let channels = self.probes.iter().map(hop).enumerate();
+        channels.min_by_key(|(_, hop)| hop.unwrap_or(usize::MAX)).map_or(0, |(at, _)| 2 * at)
+    }
+
+    /// SubDevices that frames have passed when they come to the link at an end.
+    fn before(&self, end: End) -> Option<u16> {
+        let tree = self.play.lab.tree();
+        let link = tree.links().get(tree.link_at(end)?)?;
+        let position = tree.position(link.downstream.node()?)?;
+        u16::try_from(position).ok()
     }
 
     fn told(&self, finding: &FindingReport) -> String {
@@ -311,142 +369,5 @@ fn hide_counters(bytes: &mut [u8]) {
             return;
         }
         at = counter_at + WKC_LEN;
-    }
-}
-
-/// A spot on the way of a frame.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum Spot {
-    /// Inside the sender of a hop, before its output; by its node, `None` for the computer.
-    Device(Option<usize>),
-    /// On a hop: a stage of it.
-    Hop(usize, HopStage),
-}
-
-/// A stage of a hop.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-enum HopStage {
-    Output,
-    Cable,
-    Input,
-    /// The hop as a whole, as findings name it.
-    Whole,
-}
-
-impl Spot {
-    /// The place as findings name it.
-    const fn place(self) -> Self {
-        match self {
-            Self::Device(_) => self,
-            Self::Hop(hop, _) => Self::Hop(hop, HopStage::Whole),
-        }
-    }
-}
-
-/// The way of the frames of card A, with the ports of the probe.
-struct ProbedWay {
-    hops: Vec<Hop>,
-    /// Hop and whether the port sits at its end, in the order of the way.
-    ports: Vec<(usize, bool)>,
-}
-
-impl ProbedWay {
-    fn of(tree: &Tree, probes: &[End]) -> Self {
-        let hops = Route::intact(tree).hops().to_vec();
-        let at = |hop: &Hop, end: &End| hop.from == *end || hop.to == *end;
-        let port = |(index, hop): (usize, &Hop)| {
-            let plug = probes.iter().find(|end| at(hop, end))?;
-            Some((index, hop.to == *plug))
-        };
-        let ports = hops.iter().enumerate().filter_map(port).collect();
-        Self { hops, ports }
-    }
-
-    /// Place at which a fault acts.
-    fn spots(&self, truth: &Truth) -> Vec<Spot> {
-        let stage = if truth.name == FaultName::TransmitterDamaged {
-            HopStage::Output
-        } else if truth.name == FaultName::ReceiverDamaged {
-            HopStage::Input
-        } else {
-            HopStage::Cable
-        };
-        let index = |end: End<DeviceId>| end.map(DeviceId::index);
-        let hop = |from: End<DeviceId>, to: End<DeviceId>| {
-            let (from, to) = (index(from), index(to));
-            let found = self.hops.iter().position(|hop| hop.from == from && hop.to == to);
-            found.map(|hop| Spot::Hop(hop, stage))
-        };
-        let spots = truth.places.iter().flat_map(|place| match *place {
-            TruthPlace::Hop(from, to) => vec![hop(from, to)],
-            TruthPlace::Link(a, b) => vec![hop(a, b), hop(b, a)],
-            TruthPlace::Device(id) => vec![Some(Spot::Device(Some(id.index())))],
-            TruthPlace::Host(_) => vec![
-                Some(Spot::Device(None)),
-                Some(Spot::Hop(0, HopStage::Output)),
-                Some(Spot::Hop(self.hops.len() - 1, HopStage::Input)),
-            ],
-        });
-        spots.flatten().collect()
-    }
-
-    /// The places that the ports of a probe leave over for what becomes visible from a spot on; `None` where none of
-    /// them sees it. Which end of its link a port is plugged into is not known from frames.
-    fn ideal(&self, spot: Spot) -> Option<Vec<Spot>> {
-        let mut found: Option<Vec<Spot>> = None;
-        for order in self.orders(spot) {
-            let place = |port: &(usize, bool)| 10 * port.0 + if port.1 { 6 } else { 3 };
-            let before = self.ports.iter().rev().find(|port| place(port) < order);
-            let Some(behind) = self.ports.iter().find(|port| place(port) > order) else { continue };
-            let first = before.map_or(0, |port| port.0);
-            let mut places = Vec::new();
-            for hop in first..=behind.0 {
-                if hop > first || before.is_none() {
-                    places.push(Spot::Device(self.hops[hop].from.node()));
-                }
-                places.push(Spot::Hop(hop, HopStage::Whole));
-            }
-            found.get_or_insert_default().extend(places);
-        }
-        found
-    }
-
-    /// Where on the way a spot lies, from 0: a device at each hop that leaves it.
-    fn orders(&self, spot: Spot) -> Vec<usize> {
-        match spot {
-            Spot::Hop(hop, HopStage::Output) => vec![10 * hop + 2],
-            Spot::Hop(hop, HopStage::Cable | HopStage::Whole) => vec![10 * hop + 4],
-            Spot::Hop(hop, HopStage::Input) => vec![10 * hop + 8],
-            Spot::Device(node) => {
-                let hops = self.hops.iter().enumerate();
-                hops.filter(|(_, hop)| hop.from.node() == node).map(|(at, _)| 10 * at).collect()
-            }
-        }
-    }
-
-    /// What the site of a claim means on the way.
-    fn places(&self, site: Site) -> Vec<Spot> {
-        let index = |end: End<DeviceId>| end.map(DeviceId::index);
-        match site {
-            Site::Device(id) => vec![Spot::Device(Some(id.index()))],
-            Site::Host => vec![Spot::Device(None)],
-            Site::Network => {
-                (0..self.hops.len()).map(|hop| Spot::Hop(hop, HopStage::Whole)).collect()
-            }
-            Site::Link { a, b, way } => {
-                let (a, b) = (index(a), b.map(index));
-                let is_meant = |hop: &Hop| {
-                    let down = hop.from == a && b.is_none_or(|b| hop.to == b);
-                    let up = hop.to == a && b.is_none_or(|b| hop.from == b);
-                    match way {
-                        Some(Way::AToB) => down,
-                        Some(Way::BToA) => up,
-                        None => down || up,
-                    }
-                };
-                let hops = self.hops.iter().enumerate().filter(|(_, hop)| is_meant(hop));
-                hops.map(|(hop, _)| Spot::Hop(hop, HopStage::Whole)).collect()
-            }
-        }
     }
 }

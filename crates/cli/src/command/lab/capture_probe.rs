@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use linesman_lab::score::capture_probe::{ProbeCaseReport, ProbeOutcome, run_probe_case};
+use linesman_lab::score::capture_probe::{
+    ProbeCaseReport, ProbeKind, ProbeOutcome, run_probe_case,
+};
 
 use super::{on_all_processors, seeds};
 use crate::exit::Status;
@@ -17,6 +19,9 @@ pub(crate) struct Arguments {
     /// From the first seed up to, not including, the second
     #[arg(long, value_name = "A..B", value_parser = seeds)]
     seeds: Range<u64>,
+    /// Record by the cards of a tap, of which the links are told: no records, and damaged frames are dropped
+    #[arg(long)]
+    tap: bool,
     /// Also each case with what was said, those that are wrong in any case
     #[arg(long)]
     list: bool,
@@ -63,7 +68,9 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let total = arguments.seeds.end - arguments.seeds.start;
     let (mut done, mut all) = (0, FaultCount::default());
     let mut rows: BTreeMap<&str, FaultCount> = BTreeMap::new();
-    on_all_processors(arguments.seeds.clone(), run_probe_case, |report| {
+    let kind = if arguments.tap { ProbeKind::Tap } else { ProbeKind::Recording };
+    let play = move |seed| run_probe_case(seed, kind);
+    on_all_processors(arguments.seeds.clone(), play, |report| {
         done += 1;
         progress.show(|| format!("{done} of {}", count(total, "seed")));
         let name = report.fault.map_or("healthy lines", |fault| fault.name());
