@@ -13,6 +13,8 @@ mod recordings;
 pub(crate) mod ring;
 mod segment;
 pub(crate) mod several;
+mod tap;
+mod target;
 
 use std::path::{Path, PathBuf};
 
@@ -22,12 +24,13 @@ use linesman_diagnosis::report::second_look::{EarlierLook, RepairStep};
 use linesman_diagnosis::report::{Diagnosis, Understood, Verdict};
 use linesman_diagnosis::{Engine, Setup};
 use linesman_proto::address::Network;
-use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 use linesman_runtime::selector::Selector;
 
 use self::follow::Follower;
 use self::probe_recording::ProbeArguments;
+use self::tap::TapArguments;
+use self::target::Target;
 use crate::amount::{count, lasting};
 use crate::drawing;
 use crate::exit::Status;
@@ -112,6 +115,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, value_name = "STATE", ignore_case = true)]
     to: Option<Target>,
     #[command(flatten)]
+    tap: TapArguments,
+    #[command(flatten)]
     probe: ProbeArguments,
     /// Write the diagnosis as a page of its own: drawing, time line, evidence, what to do
     #[arg(long, value_name = "FILE.html")]
@@ -138,31 +143,6 @@ impl Arguments {
     }
 }
 
-/// A state to drive to.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, clap::ValueEnum)]
-enum Target {
-    /// No communication but registers
-    Init,
-    /// Mailboxes
-    Preop,
-    /// Mailboxes and inputs
-    Safeop,
-    /// Everything
-    #[default]
-    Op,
-}
-
-impl From<Target> for AlState {
-    fn from(target: Target) -> Self {
-        match target {
-            Target::Init => Self::Init,
-            Target::Preop => Self::PreOp,
-            Target::Safeop => Self::SafeOp,
-            Target::Op => Self::Op,
-        }
-    }
-}
-
 /// Judges what the selector names.
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     if arguments.together || !arguments.separate && ring::is_ring(&arguments.places) {
@@ -181,6 +161,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     refuse_misplaced(arguments, &selector)?;
     for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
+    }
+    if !matches!(selector, Selector::File(_)) {
+        arguments.tap.refuse(place, "this is none")?;
     }
     let project = arguments.project.as_deref().map(Planned::open).transpose()?;
     let earlier = arguments.after.as_deref().map(earlier_look).transpose()?;
@@ -282,6 +265,7 @@ pub(crate) struct DiagnosisRun {
     surveyed: Option<CaptureReport>,
     svg: Option<PathBuf>,
     origin: page::Origin,
+    tap: TapArguments,
     devices: bool,
     json: bool,
     /// Of a pasted text: what was understood.
@@ -318,6 +302,7 @@ impl DiagnosisRun {
             surveyed: None,
             svg: arguments.svg.clone(),
             origin: arguments.origin.clone(),
+            tap: arguments.tap.clone(),
             devices: arguments.devices,
             json: arguments.json,
             understood: None,

@@ -288,6 +288,100 @@ fn names_that_the_sii_was_not_read_for_come_from_a_device_description() {
     assert_eq!(named[2].1, "sii", "the SubDevice itself says what is there");
 }
 
+/// The frames of a recording with NOP in place of reads of the SII from word 0x40 on: of its categories nobody read any.
+fn without_categories(recorded: &Path) -> Pcap {
+    /// Categories of a SII begin at this word.
+    const CATEGORIES: u16 = 0x40;
+    let mut reader = linesman_link::capture::CaptureReader::open(recorded).unwrap();
+    let mut frames: Vec<Vec<u8>> = Vec::new();
+    let mut times = Vec::new();
+    let mut start = None;
+    while let Some(frame) = reader.next_frame() {
+        let time = frame.time.unwrap();
+        times.push(time.since(*start.get_or_insert(time)).unwrap().as_nanos() / 1_000);
+        frames.push(frame.bytes.to_vec());
+    }
+    let word = |bytes: &[u8], at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    for number in 0..frames.len() {
+        let (sent, rest) = frames.split_at_mut(number);
+        let back = &mut rest[0];
+        let is_sent = |frame: &&mut Vec<u8>| frame[6] & 2 == 0 && frame[17] == back[17];
+        if back[6] & 2 == 0 {
+            continue;
+        }
+        let Some(sent) = sent.iter_mut().rev().find(is_sent) else { continue };
+        let mut at = 16;
+        loop {
+            let length = word(back, at + 6);
+            let len = usize::from(length & 0x7FF);
+            // Control, address and data in one read.
+            if (back[at], word(back, at + 4), len) == (4, 0x0502, 14)
+                && word(back, at + 12) >= CATEGORIES
+            {
+                for copy in [&mut *sent, back] {
+                    copy[at] = 0;
+                    copy[at + 10..at + 12 + len].fill(0);
+                }
+            }
+            at += 12 + len;
+            if length & 0x8000 == 0 {
+                break;
+            }
+        }
+    }
+    let mut capture = Pcap::new();
+    for (bytes, time) in frames.iter().zip(times) {
+        capture.frame(time, bytes);
+    }
+    capture
+}
+
+#[test]
+fn bits_of_the_process_image_have_the_names_of_a_device_description_where_frames_tell_none() {
+    let folder = TempDir::new().unwrap();
+    let (plant, recorded) = (folder.path().join("plant.toml"), folder.path().join("own.pcapng"));
+    let devices = "[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+                   [[device]]\nname = \"I1\"\ntype = \"EL1008\"\non = \"K1.B\"\n\
+                   [[device]]\nname = \"I2\"\ntype = \"EL1004\"\non = \"I1.B\"\n";
+    fs::write(&plant, format!("name = \"names\"\nseed = 1\n{devices}")).unwrap();
+    let place = format!("sim:{}", plant.display());
+    let words = ["diagnose", &place, "--seconds", "1", "--record", recorded.to_str().unwrap()];
+    assert!(linesman(words).status <= 1);
+    let path = file(&folder, without_categories(&recorded));
+    let bare = info(&path);
+    let parts: Vec<(u64, usize)> =
+        entries(&bare).iter().map(|part| (part.0, part.2.len())).collect();
+    assert_eq!(parts, [(2, 0), (3, 0)], "who has bits is known by FMMUs, their names by nothing");
+    let (product, revision) =
+        (&bare["devices"][1]["product_code"], &bare["devices"][1]["revision"]);
+    let esi = folder.path().join("esi.xml");
+    let pdo = |no: u16| {
+        format!(
+            "<TxPdo Fixed=\"1\" Sm=\"0\"><Index>#x{:04X}</Index><Name>Lamp {}</Name><Entry><Index>#x{:04X}</Index>\
+             <SubIndex>1</SubIndex><BitLen>1</BitLen><Name>Lit</Name><DataType>BOOL</DataType></Entry></TxPdo>",
+            0x1A00 + no,
+            no + 1,
+            0x6000 + 16 * no
+        )
+    };
+    let pdos: String = (0..8).map(pdo).collect();
+    let described = format!(
+        "<EtherCATInfo><Vendor><Id>2</Id><Name>V</Name></Vendor><Descriptions><Groups/><Devices><Device Physics=\"YKY\">\
+         <Type ProductCode=\"{product}\" RevisionNo=\"{revision}\">EL1008</Type><Name>Eight inputs</Name>\
+         <Sm StartAddress=\"#x1000\" ControlByte=\"#x00\" Enable=\"1\">Inputs</Sm>{pdos}\
+         <Eeprom><ByteSize>2048</ByteSize><ConfigData>0601</ConfigData></Eeprom></Device></Devices></Descriptions></EtherCATInfo>"
+    );
+    fs::write(&esi, described).unwrap();
+    let arguments = ["capture", "info", path.to_str().unwrap(), "--esi", esi.to_str().unwrap()];
+    let run = linesman([&arguments[..], &["--json"]].concat());
+    let named = entries(&run.json());
+    assert_eq!((named[0].0, named[0].1.as_str(), named[0].2.len()), (2, "esi", 8), "{named:?}");
+    assert_eq!(named[0].2[3], "0.3+1 1A03 Lamp 4/6030:1 Lit");
+    assert_eq!((named[1].0, named[1].2.len()), (3, 0), "nothing describes it: {named:?}");
+    let text = linesman([&arguments[..], &["--all"]].concat()).stdout;
+    assert!(text.contains("0x1A03 Lamp 4  0x6030:01  Lit"), "{text}");
+}
+
 #[test]
 fn line_that_nobody_answers_on_is_told_without_claims() {
     let Some(directory) = captures() else { return };

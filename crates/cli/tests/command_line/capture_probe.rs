@@ -95,3 +95,98 @@ fn damage_without_counters_is_placed_by_the_probe_alone() {
     assert_eq!(run.status, 0, "{}", run.all());
     assert!(run.stdout.contains("H116 NicDamaged"), "{}", run.stdout);
 }
+
+/// The findings of a diagnosis with those that follow from them.
+fn codes(judged: &serde_json::Value) -> Vec<String> {
+    let findings = judged["findings"].as_array().unwrap().iter();
+    findings.map(|finding| finding["code"].as_str().unwrap().to_owned()).collect()
+}
+
+// proves: WS-06 partial: the place of a probe without records
+#[test]
+fn healthy_line_recorded_by_a_tap_inside_it_is_healthy_where_its_link_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    // Each way by an interface of its own, and both by one.
+    for file in ["two.pcapng", "one.pcap"] {
+        let file = recorded(folder.path(), "", "K1.C", file, "tap");
+        let run = linesman(["diagnose", &file, "--probe", "1.C-3.A", "--json"]);
+        let judged = run.json();
+        assert_eq!(judged["verdict"], "healthy", "{judged}");
+        assert_eq!(codes(&judged), Vec::<String>::new(), "{judged}");
+        assert_eq!(judged["network"]["devices"], 4);
+        // Without it, frames that have passed two SubDevices are nobody's requests.
+        let unplaced = linesman(["diagnose", &file, "--json"]);
+        assert_ne!(unplaced.json()["verdict"], "healthy", "{}", unplaced.stdout);
+    }
+}
+
+// proves: WS-06 partial: the place of a probe without records
+#[test]
+fn frames_that_pass_a_tap_once_were_damaged_behind_its_link() {
+    let folder = tempfile::tempdir().unwrap();
+    let fault = "\n[[fault]]\nkind = \"cable-degraded\"\nat = \"K2.B>I1.A\"\nfrom_ms = 1000\n\
+                 hits_per_s = 400\n";
+    for file in ["two.pcapng", "one.pcap"] {
+        let file = recorded(folder.path(), fault, "K1.C", file, "tap");
+        let run = linesman(["diagnose", &file, "--probe", "1.C-3.A", "--json"]);
+        assert_eq!(run.status, 1, "{}", run.all());
+        assert!(run.stdout.contains("the tap on the link to "), "{}", run.stdout);
+        let turned = linesman(["diagnose", &file, "--probe", "3.A-1.C", "--json"]).stdout;
+        assert!(turned.contains("on the way back: they were damaged or lost"), "{turned}");
+    }
+}
+
+#[test]
+fn tap_at_two_links_takes_a_place_for_each_interface() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recorded(folder.path(), "", "maindevice,K2.A", "both.pcapng", "tap");
+    let interfaces = ["tap0=maindevice-1.A", "tap1=maindevice-1.A", "2=1.C-3.A", "3=1.C-3.A"];
+    let places: Vec<&str> = interfaces.iter().flat_map(|place| ["--probe", place]).collect();
+    let run = linesman([&["diagnose", &file, "--json"], &places[..]].concat());
+    assert_eq!(run.json()["verdict"], "healthy", "{}", run.all());
+    // Of two of them nothing was said.
+    let run = linesman([&["diagnose", &file], &places[..4]].concat());
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert!(run.stderr.contains("interface 2 (tap2)"), "{}", run.stderr);
+    let run = linesman(["diagnose", &file, "--probe", "eth9=maindevice-1.A"]);
+    assert_eq!(run.status, 2, "{}", run.all());
+    assert!(run.stderr.contains("`eth9`") && run.stderr.contains("tap3"), "{}", run.stderr);
+}
+
+#[test]
+fn link_of_a_tap_that_is_none_is_refused_with_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recorded(folder.path(), "", "K1.C", "tap.pcapng", "tap");
+    let record = recorded(folder.path(), "", "K1.C", "probe.pcapng", "behind");
+    let plant = folder.path().join("tap.pcapng.toml");
+    let project = folder.path().join("project.toml");
+    let planned = PLANT.replace("seed = 7\n", "");
+    std::fs::write(&project, planned).unwrap();
+    let project = project.to_str().unwrap();
+    let place = format!("sim:{}", plant.display());
+    let rows: &[(&[&str], &str)] = &[
+        (&[&file, "--probe", "3.B"], "`3.B` is no link"),
+        (&[&file, "--probe", "K1.C-K2.A"], "no SubDevice is called `K1`"),
+        (&[&file, "--probe", "K1.C-K9.A", "--project", project], "no SubDevice is called `K9`"),
+        (&[&file, "--probe", "K1.B-K2.A", "--project", project], "1.B leads to 2.A"),
+        (&[&file, "--probe", "1.B-3.A"], "1.B leads to 2.A"),
+        (&[&file, "--probe", "4.B-5.A"], "broadcasts had passed 2 SubDevices"),
+        (&[&file, "--probe", "4.B-5.A", "--project", project], "the line has 4 SubDevices"),
+        (&[&file, "--probe", "1.B-2.A"], "broadcasts had passed 2 SubDevices"),
+        (&[&file, "--probe", "maindevice.B-4.A"], "second card of a ring"),
+        (&[&file, "--probe", "1.B-1.C"], "both ends are at one device"),
+        (&[&file, "--probe", "1.C-3.A", "--probe", "3.B-4.A"], "another place was named"),
+        (&[&record, "--probe", "1.C-3.A"], "records of a capture probe"),
+        (&[&place, "--probe", "1.C-3.A"], "--probe says where a capture was taken"),
+        (&[project, "--probe", "1.C-3.A"], "this is a text"),
+    ];
+    for (arguments, expected) in rows {
+        let run = linesman([&["diagnose"], *arguments].concat());
+        assert_eq!(run.status, 2, "{arguments:?}: {}", run.all());
+        assert!(run.stderr.contains(expected), "{arguments:?}: {}", run.stderr);
+        assert!(run.stderr.contains("Do: ") || run.stderr.contains("do: "), "{}", run.stderr);
+    }
+    // By names, where the project has them.
+    let named = ["diagnose", &file, "--probe", "K1.C-K2.A", "--project", project, "--json"];
+    assert_eq!(linesman(named).json()["verdict"], "healthy");
+}

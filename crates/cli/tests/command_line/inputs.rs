@@ -265,3 +265,65 @@ fn ctrl_c_in_a_long_capture_gives_the_verdict_so_far() {
     let said = run.stderr.lines().find(|line| line.contains("ended at ")).unwrap();
     assert!(said.contains(" %, ") && said.contains("judged so far"), "{said}");
 }
+
+#[test]
+fn pipe_that_ends_before_anything_came_is_called_so() {
+    for words in [&["diagnose", "-"][..], &["capture", "info", "-"], &["capture", "list", "-"]] {
+        let (child, stdin) = piped(words);
+        drop(stdin);
+        let run = ended(child);
+        assert_eq!(run.status, 2, "{}", run.all());
+        assert!(run.stderr.contains("standard input ended before anything came"), "{}", run.all());
+        assert!(
+            run.stderr.contains("do: look whether the command before the pipe"),
+            "{}",
+            run.all()
+        );
+    }
+}
+
+#[test]
+fn frames_without_ethernet_are_named_where_they_are_left_out() {
+    let folder = TempDir::new().unwrap();
+    let mut bytes = capture(10);
+    // The link type of the file: Wi-Fi.
+    bytes[20..24].copy_from_slice(&105_u32.to_le_bytes());
+    let path = write(&folder, "wifi.pcap", bytes);
+    let (path, out) = (path.to_str().unwrap(), folder.path().join("some.pcapng"));
+    let csv = folder.path().join("rows.csv");
+    let rows: &[&[&str]] = &[
+        &["capture", "list", path],
+        &["capture", "filter", path, "cyclic", "-o", out.to_str().unwrap()],
+        &["capture", "export", path, "--csv", csv.to_str().unwrap()],
+    ];
+    for words in rows {
+        let run = linesman(*words);
+        let said = "20 frames of link type Wi-Fi (105) were left out: they carry no Ethernet";
+        assert!(run.stderr.contains(said), "{words:?}: {}", run.all());
+    }
+}
+
+#[test]
+fn clock_that_was_set_back_is_told_with_how_far() {
+    let folder = TempDir::new().unwrap();
+    let mut bytes = capture(20);
+    let path = write(&folder, "steady.pcap", &bytes);
+    let run = linesman(["diagnose", path.to_str().unwrap()]);
+    assert!(!run.stderr.contains("set back"), "{}", run.all());
+    // The second half, an hour earlier.
+    let record = 16 + 60;
+    for number in 20..40 {
+        let at = 24 + number * record;
+        let seconds = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) - 3_600;
+        bytes[at..at + 4].copy_from_slice(&seconds.to_le_bytes());
+    }
+    let path = write(&folder, "back.pcap", bytes);
+    for words in [
+        ["diagnose", path.to_str().unwrap()].as_slice(),
+        &["capture", "info", path.to_str().unwrap()],
+    ] {
+        let run = linesman(words);
+        let said = "the clock of the recording was set back by 3599.999 s: 20 frames are earlier";
+        assert!(run.stderr.contains(said), "{}", run.all());
+    }
+}

@@ -343,7 +343,9 @@ fn each_sync_unit_gets_its_data_in_the_cycle_of_its_task() {
 }
 
 // S0 L131-137, L2741-2747.
-// proves: FRM-10 partial: without the map id of the vendor's tool, FRM-11, FRM-16
+// The source's equal plans of one frame bear map id 0 (S0 L2741) and 1 (S1 L185), those of one more tool start at 2 (S1
+// L1140): it counts mappings of the vendor's whole system, of which a plan of one network knows nothing.
+// proves: FRM-10 partial: without the map id, which no plan of one network gives, FRM-11, FRM-16
 #[test]
 fn the_plan_holds_clock_mailbox_states_process_data_and_presence() {
     let report = Bench::of("516-bytes").plan();

@@ -11,6 +11,7 @@ use linesman_proto::address::Network;
 use linesman_runtime::capture::{Capture, CaptureItem};
 
 use crate::command::bundle::frames;
+use crate::command::diagnose::capture::skipped;
 use crate::command::service::address::{DeviceNames, find_all};
 use crate::failure::Failure;
 use crate::files::Planned;
@@ -187,6 +188,12 @@ impl RowSource {
 
     /// Says how a capture ended, if it is not whole; whether it is.
     fn tell_end(&self, capture: &Capture, output: &Output) -> bool {
+        if let Some(skipped) = skipped(capture) {
+            output.warn(&format!(
+                "{}: {skipped} were left out: they carry no Ethernet",
+                self.label()
+            ));
+        }
         if let Some(fault) = capture.fault() {
             output.warn(&format!("{fault}: its frames and those behind are missing"));
             return false;

@@ -6,6 +6,7 @@ use linesman_capture::Survey;
 use linesman_diagnosis::{Engine, FrameSeen};
 use linesman_link::input::Input;
 use linesman_proto::address::Network;
+use linesman_proto::time::Span;
 use linesman_runtime::capture::Capture;
 use linesman_runtime::stop::Stop;
 
@@ -15,6 +16,8 @@ use crate::output::{Output, Progress};
 use crate::text::finding::percent;
 use crate::text::quantity::{count, time};
 
+/// A clock that was set back by as much was set, and no card has put its frames into another order.
+const SET_BACK: Span = Span::ms(100);
 /// Between two looks at the clock: some tens of milliseconds.
 const FRAMES_BETWEEN_LOOKS: u64 = 32_768;
 
@@ -57,7 +60,15 @@ fn judge_frames(
 ) -> Result<Judged, Failure> {
     session.setup.start = capture.start().and_then(|start| start.rfc3339());
     session.setup.clock = "capture".to_owned();
+    let tap = session.tap.links(session.setup.project.as_ref())?;
+    if let Some(tap) = &tap {
+        session.setup.tap_places = tap.before();
+        capture = capture.by_tap(tap.tap());
+    }
     let mut engine = Engine::new(session.setup.clone());
+    if let Some(tap) = &tap {
+        tap.check_wiring(&engine)?;
+    }
     // The page tells what happened by time.
     let mut survey = session.html.is_some().then(Survey::default);
     let whole = read(path, &mut capture, stop, output, |frame, output| {
@@ -77,6 +88,12 @@ fn judge_frames(
     // Copies of a capture probe are frames once all have come.
     if engine.diagnosis().network.frames.0 == 0 {
         return Err(nothing_seen(path, &capture, whole.frames));
+    }
+    if let Some(tap) = &tap {
+        tap.check(&engine, &capture).map_err(|failure| failure.at(&path.display().to_string()))?;
+        if let Some(unused) = tap.unused(&engine) {
+            output.warn(&unused);
+        }
     }
     session.surveyed = survey.and_then(|survey| survey.report(&engine));
     session.tell_rest(&mut engine, output);
@@ -132,22 +149,32 @@ pub(crate) fn read(
         let (read, frames) = (read(capture.progress()), count(frames, "frame"));
         output.warn(&format!("{}: ended at {read}{frames}: judged so far", path.display()));
     }
+    let (earlier, most) = capture.backward();
+    if most >= SET_BACK {
+        output.warn(&format!(
+            "{}: the clock of the recording was set back by {}: {} are earlier than one before them, and times across \
+             that say nothing",
+            path.display(),
+            most,
+            count(earlier, "frame")
+        ));
+    }
     ReadFrames { frames, is_complete }
+}
+
+/// Frames that were passed over, as they carry no Ethernet: `20 frames of link type Wi-Fi (105)`; `None` without any.
+pub(crate) fn skipped(capture: &Capture) -> Option<String> {
+    let skipped = capture.skipped().iter().map(|skipped| {
+        format!("{} of link type {}", count(skipped.frames, "frame"), skipped.link_type)
+    });
+    let skipped: Vec<String> = skipped.collect();
+    (!skipped.is_empty()).then(|| skipped.join(", "))
 }
 
 /// Why a capture without EtherCAT says nothing.
 pub(crate) fn nothing_seen(path: &Path, capture: &Capture, frames: u64) -> Failure {
-    let skipped: Vec<String> = capture
-        .skipped()
-        .iter()
-        .map(|skipped| {
-            format!("{} of link type {}", count(skipped.frames, "frame"), skipped.link_type)
-        })
-        .collect();
-    let also = match skipped.is_empty() {
-        true => String::new(),
-        false => format!(", and {} that carry no Ethernet", skipped.join(", ")),
-    };
+    let also = skipped(capture)
+        .map_or_else(String::new, |skipped| format!(", and {skipped} that carry no Ethernet"));
     let reason = format!(
         "{}: no EtherCAT frame among {}{also}; expected EtherType 0x88A4 or UDP port 34980",
         path.display(),

@@ -19,6 +19,14 @@ pub(super) fn judge(
 ) -> Result<Judged, Failure> {
     let wish = stop.clone();
     let input = Input::open_until(path, move || wish.is_set()).map_err(CaptureError::from)?;
+    let name = path.display().to_string();
+    match input.content() {
+        Content::Capture => {}
+        Content::Archive => {
+            session.tap.refuse(&name, "a bundle was recorded by the cards of the MainDevice")?
+        }
+        Content::Text => session.tap.refuse(&name, "this is a text")?,
+    }
     match input.content() {
         Content::Capture => {
             session.setup.source = format!("capture:{}", path.display());

@@ -39,6 +39,9 @@ enum RecordForm {
     Behind,
     /// In front of it
     Front,
+    /// No record, as the cards of a tap write: an interface for each port where the file is a pcapng, and no damaged
+    /// frames, which cards drop
+    Tap,
 }
 
 /// A recording that is being written.
@@ -52,7 +55,8 @@ pub(super) struct ProbeRecording {
 
 enum CaptureFile {
     Pcap(PcapWriter<BufWriter<File>>),
-    Pcapng(PcapngWriter<BufWriter<File>>, CaptureInterfaceId),
+    /// With the interfaces: one for the probe, or one for each port of a tap.
+    Pcapng(PcapngWriter<BufWriter<File>>, Vec<CaptureInterfaceId>),
 }
 
 impl ProbeArguments {
@@ -74,7 +78,11 @@ impl ProbeArguments {
         })?;
         files::refuse_to_overwrite(path)?;
         let in_file = |error: CaptureWriteError| files::in_file(path, &error);
-        let file = CaptureFile::create(path).map_err(in_file)?;
+        let ports = match self.probe_form {
+            RecordForm::Tap => 2 * self.probe_at.len(),
+            RecordForm::Behind | RecordForm::Front => 0,
+        };
+        let file = CaptureFile::create(path, ports).map_err(in_file)?;
         let (frame, stored) = (Vec::new(), Vec::new());
         Ok(Some(ProbeRecording { path: path.clone(), file, form: self.probe_form, frame, stored }))
     }
@@ -84,6 +92,9 @@ impl ProbeRecording {
     /// Writes what the probe has seen.
     pub(super) fn take(&mut self, lab: &mut Lab) -> Result<(), Failure> {
         while let Some(seen) = lab.poll_probe_frame(&mut self.frame) {
+            if self.form == RecordForm::Tap && seen.record.is_damaged() {
+                continue;
+            }
             let record = seen.record.to_bytes();
             self.stored.clear();
             if self.form == RecordForm::Front {
@@ -96,7 +107,8 @@ impl ProbeRecording {
             // The clock of the probe: that of the file begins in 1970 as well.
             let at =
                 UnixTime::EPOCH + Instant::from_nanos(seen.record.time_ns).since(Instant::ZERO);
-            let written = self.file.write(at, &self.stored);
+            let port = seen.record.port.filter(|_| self.form == RecordForm::Tap);
+            let written = self.file.write(at, port, &self.stored);
             written.map_err(|error| files::in_file(&self.path, &error))?;
         }
         Ok(())
@@ -113,28 +125,41 @@ impl ProbeRecording {
 }
 
 impl CaptureFile {
-    fn create(path: &Path) -> Result<Self, CaptureWriteError> {
+    /// A new file, with an interface for each of `ports`, or one for the probe.
+    fn create(path: &Path, ports: usize) -> Result<Self, CaptureWriteError> {
         let file = BufWriter::new(File::create_new(path)?);
         if path.extension().is_some_and(|extension| extension == "pcap") {
             return PcapWriter::new(file, LinkType::Ethernet, false).map(Self::Pcap);
         }
         let mut writer = PcapngWriter::new(file, &version::tool())?;
-        let interface = writer.add_interface(&InterfaceToWrite {
-            name: "probe",
-            description: "capture probe",
-            link_type: LinkType::Ethernet,
-        })?;
-        Ok(Self::Pcapng(writer, interface))
+        let names: Vec<(String, &str)> = match ports {
+            0 => vec![("probe".to_owned(), "capture probe")],
+            ports => (0..ports).map(|port| (format!("tap{port}"), "card of a tap")).collect(),
+        };
+        let mut interfaces = Vec::with_capacity(names.len());
+        for (name, description) in &names {
+            let interface = InterfaceToWrite { name, description, link_type: LinkType::Ethernet };
+            interfaces.push(writer.add_interface(&interface)?);
+        }
+        Ok(Self::Pcapng(writer, interfaces))
     }
 
-    fn write(&mut self, at: UnixTime, stored: &[u8]) -> Result<(), CaptureWriteError> {
+    /// Writes a frame, of this port of a tap or of the probe.
+    fn write(
+        &mut self,
+        at: UnixTime,
+        port: Option<u8>,
+        stored: &[u8],
+    ) -> Result<(), CaptureWriteError> {
         let unknown = FrameDirection::Unknown;
         match self {
             Self::Pcap(writer) => {
                 writer.write_frame(&FrameToWrite::new(CaptureInterfaceId(0), at, unknown, stored))
             }
-            Self::Pcapng(writer, interface) => {
-                writer.write_frame(&FrameToWrite::new(*interface, at, unknown, stored))
+            Self::Pcapng(writer, interfaces) => {
+                let interface = interfaces.get(usize::from(port.unwrap_or(0))).copied();
+                let interface = interface.unwrap_or(CaptureInterfaceId(0));
+                writer.write_frame(&FrameToWrite::new(interface, at, unknown, stored))
             }
         }
     }
