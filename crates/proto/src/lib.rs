@@ -13,6 +13,7 @@
 //! technology group's documents as cited by the public sources that follow them.
 
 pub mod address;
+pub mod ads;
 pub mod command;
 pub mod esl;
 pub mod ethernet;

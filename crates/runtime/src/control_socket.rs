@@ -118,11 +118,43 @@ impl<P: Protocol> Asked<P> {
     }
 }
 
-/// What a connection's thread needs.
-struct Connection<P: Protocol> {
+/// Way of requests to the thread that does them.
+pub(crate) struct RequestSender<P: Protocol> {
     requests: SyncSender<Asked<P>>,
     wake_handle: WakeHandle,
     protocol: P,
+}
+
+/// A way of requests, and its end at the thread that does them, which `wake_handle` wakes.
+pub(crate) fn request_queue<P: Protocol>(
+    wake_handle: WakeHandle,
+    protocol: P,
+) -> (RequestSender<P>, Receiver<Asked<P>>) {
+    let (requests, receiver) = mpsc::sync_channel(WAITING);
+    (RequestSender { requests, wake_handle, protocol }, receiver)
+}
+
+impl<P: Protocol> RequestSender<P> {
+    /// Sends a request; `None` when too many wait, or nobody does them any more.
+    pub(crate) fn send(&self, request: P::Request) -> Option<SentRequest<P>> {
+        let (reply, answer) = mpsc::channel();
+        let asked = self.requests.try_send(Asked { request, reply });
+        self.wake_handle.wake();
+        asked.ok().map(|()| SentRequest(answer))
+    }
+
+    /// The answer to a request; `None` when there was none within [`Protocol::PATIENCE`].
+    pub(crate) fn receive(&self, SentRequest(answer): &SentRequest<P>) -> Option<P::Answer> {
+        answer.recv_timeout(P::PATIENCE).ok().map(|reply| self.protocol.answer(reply))
+    }
+}
+
+/// A request whose answer is waited for.
+pub(crate) struct SentRequest<P: Protocol>(Receiver<P::Reply>);
+
+/// What a connection's thread needs.
+struct Connection<P: Protocol> {
+    sender: RequestSender<P>,
     clients: AtomicUsize,
 }
 
@@ -138,10 +170,8 @@ impl<P: Protocol> ControlSocket<P> {
         }
         let listener = UnixListener::bind(path)?;
         hand_over(path);
-        let (requests, receiver) = mpsc::sync_channel(WAITING);
-        let connection =
-            Connection { requests, wake_handle, protocol, clients: AtomicUsize::default() };
-        let connection = Arc::new(connection);
+        let (sender, receiver) = request_queue(wake_handle, protocol);
+        let connection = Arc::new(Connection { sender, clients: AtomicUsize::default() });
         let failed = Arc::default();
         let (socket, closed) = (WatchedFile::at(path), Arc::default());
         let watch = ControlSocketWatch { socket, failed: Arc::clone(&failed), closed };
@@ -230,7 +260,7 @@ impl<P: Protocol> Connection<P> {
     }
 
     fn refuse(&self, stream: &UnixStream, why: String) -> io::Result<()> {
-        reply(stream, &self.protocol.refusal(why))
+        reply(stream, &self.sender.protocol.refusal(why))
     }
 
     /// One request after another, until there is no more.
@@ -255,7 +285,7 @@ impl<P: Protocol> Connection<P> {
             match serde_json::from_slice::<P::Request>(&line) {
                 Ok(request) => {
                     let answer = self.relay(request.clone());
-                    if self.protocol.keep(&request, &answer, stream)? {
+                    if self.sender.protocol.keep(&request, &answer, stream)? {
                         return Ok(());
                     }
                     reply(stream, &answer)?;
@@ -276,21 +306,15 @@ impl<P: Protocol> Connection<P> {
 
     /// Asks the thread that runs the line.
     fn relay(&self, request: P::Request) -> P::Answer {
-        let (reply, answer) = mpsc::channel();
-        let asked = self.requests.try_send(Asked { request, reply });
-        self.wake_handle.wake();
         let (who, seconds) = (P::WHO, P::PATIENCE.as_secs());
-        match asked {
-            Ok(()) => match answer.recv_timeout(P::PATIENCE) {
-                Ok(reply) => self.protocol.answer(reply),
-                Err(_) => self
-                    .protocol
-                    .refusal(format!("the {who} gave no answer within {seconds} s: ask again")),
+        let why = match self.sender.send(request) {
+            Some(sent) => match self.sender.receive(&sent) {
+                Some(answer) => return answer,
+                None => format!("the {who} gave no answer within {seconds} s: ask again"),
             },
-            Err(_) => self
-                .protocol
-                .refusal(format!("too many requests at once, or the {who} has ended: ask again")),
-        }
+            None => format!("too many requests at once, or the {who} has ended: ask again"),
+        };
+        self.sender.protocol.refusal(why)
     }
 }
 

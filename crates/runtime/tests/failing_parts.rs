@@ -58,8 +58,14 @@ fn driven<L: Transport<Error = LinkError>>(
         group: None,
     };
     let (notes, told) = sync_channel(NOTES);
-    let beside =
-        RunControls { stop: &Stop::default(), notes, socket: None, gateway: None, ethernet: None };
+    let beside = RunControls {
+        stop: &Stop::default(),
+        notes,
+        socket: None,
+        gateway: None,
+        ads: None,
+        ethernet: None,
+    };
     let wanted = PlanChoices::default().as_found();
     (run_observed(line, wanted, application, &options, beside, observer), told)
 }

@@ -113,8 +113,14 @@ fn in_run(file: &SegmentFile, cycle: Span, active: bool) -> Option<Diagnosis> {
         group: None,
     };
     let (notes, _told) = sync_channel(NOTES);
-    let beside =
-        RunControls { stop: &Stop::default(), notes, socket: None, gateway: None, ethernet: None };
+    let beside = RunControls {
+        stop: &Stop::default(),
+        notes,
+        socket: None,
+        gateway: None,
+        ads: None,
+        ethernet: None,
+    };
     let choices = PlanChoices { cycle: Some(cycle), ..PlanChoices::default() };
     run(line, choices.as_found(), Idle, &options, beside).ok()?.report.diagnosis
 }

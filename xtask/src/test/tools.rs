@@ -25,6 +25,7 @@ const PYTHON_PACKAGES: &[(&str, &str)] = &[
     ("kickcat", "kickcat==2.5"),
     ("ebpfcat", "ebpfcat==1.0.0"),
     ("pyetg1510", "pyetg1510==0.1.3"),
+    ("pyads", "pyads==3.6.0"),
     ("duckdb", "duckdb==2.0.1"),
 ];
 

@@ -1,5 +1,6 @@
 //! `linesman run`: a line is driven: brought up, exchanging process data, watched, stopped.
 
+pub(super) mod ads;
 mod drive;
 pub(super) mod ethernet;
 pub(super) mod gateway;
@@ -25,6 +26,7 @@ use linesman_runtime::selector::Selector;
 use linesman_runtime::system_log::SystemLog;
 use linesman_runtime::transport::{Cards, Pace, TimeShare};
 
+use self::ads::AdsArguments;
 use self::drive::{Companions, NetworkRun};
 use self::ethernet::EthernetArguments;
 use self::gateway::GatewayArguments;
@@ -111,6 +113,8 @@ pub(crate) struct Arguments {
     control: Vec<PathBuf>,
     #[command(flatten)]
     gateway: GatewayArguments,
+    #[command(flatten)]
+    ads: AdsArguments,
     #[command(flatten)]
     ethernet: EthernetArguments,
     #[command(flatten)]
@@ -313,6 +317,7 @@ impl NetworkChoices<'_> {
             image: self.image.cloned(),
             control: self.control.cloned(),
             gateway_options,
+            ads_options: arguments.ads.wanted(),
             companions: Companions::default(),
             online,
             said,

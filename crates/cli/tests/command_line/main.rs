@@ -4,6 +4,7 @@
 
 mod acceptance;
 mod addressing;
+mod ads;
 mod against;
 mod al_codes;
 mod amounts;

@@ -14,7 +14,6 @@ mod commands;
 mod counts;
 mod object_thread;
 mod objects;
-mod options;
 mod screen;
 mod server;
 mod tcp;
@@ -33,11 +32,13 @@ use linesman_maindevice::mailbox::{MailboxRequest, Why};
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
+use linesman_sim::device::dictionary::Dictionary;
 
 use self::admission::WAITING;
 pub use self::counts::{GatewayRefusal, GatewayReport};
-pub use self::options::{AllowedHosts, GatewayOptions};
 use self::server::{GatewayRequest, GatewayServer, GatewayWaiting};
+use crate::network_access::NetworkAccess;
+use crate::online::report::OnlineReport;
 use crate::online::{OnlineState, Rates, Snapshot};
 
 /// Messages that are handed to the MainDevice between two frames.
@@ -63,6 +64,11 @@ impl fmt::Debug for GatewayWatch {
     }
 }
 
+/// The objects of the MainDevice itself, as they are at address 0 before a client has written into them.
+pub(crate) fn own_objects(report: &OnlineReport) -> Dictionary {
+    objects::dictionary(report, &commands::ObjectCommands::default())
+}
+
 /// The gateway, as the thread that runs the line knows it. It is closed when this is dropped.
 pub struct MailboxGateway {
     server: Arc<GatewayServer>,
@@ -79,7 +85,7 @@ impl MailboxGateway {
     /// # Errors
     /// When the address is not one of this computer, somebody listens there already, or the system refuses.
     pub fn open(
-        options: GatewayOptions,
+        options: NetworkAccess,
         wake_handle: WakeHandle,
         online: OnlineState,
     ) -> io::Result<Self> {

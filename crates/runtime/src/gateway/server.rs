@@ -9,11 +9,12 @@ use std::time::Instant;
 use linesman_link::socket::WakeHandle;
 use linesman_proto::mailbox::{Header, MailboxType, Message, gateway};
 
-use super::admission::{GatewayClient, GatewayClients, RequestRates, WAITING, WaitingPlace};
+use super::admission::{GatewayClient, GatewayClients, WAITING, WaitingPlace};
 use super::counts::{GatewayCounts, GatewayRefusal, GatewayReport};
-use super::options::GatewayOptions;
 use super::screen::screen;
+use crate::network_access::NetworkAccess;
 use crate::online::Snapshot;
+use crate::request_rates::RequestRates;
 
 /// What the thread that runs the line is asked.
 pub(super) enum GatewayRequest {
@@ -74,7 +75,7 @@ pub(super) struct ReturnPath {
 
 /// What all threads share.
 pub(super) struct GatewayServer {
-    pub(super) options: GatewayOptions,
+    pub(super) options: NetworkAccess,
     pub(super) listen: SocketAddr,
     pub(super) clients: GatewayClients,
     pub(super) counts: GatewayCounts,
@@ -88,7 +89,7 @@ pub(super) struct GatewayServer {
 
 impl GatewayServer {
     pub(super) fn new(
-        options: GatewayOptions,
+        options: NetworkAccess,
         listen: SocketAddr,
         wake_handle: WakeHandle,
     ) -> (Self, Receiver<GatewayRequest>) {

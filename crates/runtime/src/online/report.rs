@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::ads::AdsReport;
 use crate::ethernet::EthernetReport;
 use crate::gateway::GatewayReport;
 use crate::run::group::GroupTime;
@@ -67,6 +68,9 @@ pub struct OnlineReport {
     /// What goes through the mailbox gateway; `null`: none is open.
     #[serde(default)]
     pub gateway: Option<GatewayReport>,
+    /// What goes through the ADS server; `null`: none is open.
+    #[serde(default)]
+    pub ads: Option<AdsReport>,
 }
 
 /// A hot connect group.

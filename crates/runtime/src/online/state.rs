@@ -5,13 +5,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use linesman_config::plan::Plan;
 use linesman_diagnosis::HostObservation;
 use linesman_diagnosis::observe::HostEvent;
-use linesman_maindevice::watch::LogEntry;
+use linesman_maindevice::watch::{LogEntry, TopologyEntry};
 use linesman_maindevice::{Event, Statistics, Watch};
 use linesman_proto::time::{Instant, Span};
 
 use super::build;
 use super::report::{Card, OnlineReport};
 use super::snapshot::Snapshot;
+use crate::ads::AdsWatch;
 use crate::ethernet::EthernetWatch;
 use crate::gateway::GatewayWatch;
 use crate::run::NetworkPlace;
@@ -38,6 +39,8 @@ struct OnlineShared {
     ethernet: Option<EthernetWatch>,
     /// Counts of the mailbox gateway beside the run.
     gateway: Option<GatewayWatch>,
+    /// Counts and NetId of the ADS server beside the run.
+    ads: Option<AdsWatch>,
     /// Its place among the networks of the run.
     group: Option<NetworkPlace>,
 }
@@ -73,6 +76,20 @@ impl OnlineState {
     /// A mailbox gateway is open.
     pub(crate) fn set_gateway(&self, watch: GatewayWatch) {
         self.lock().gateway = Some(watch);
+    }
+
+    /// An ADS server is open.
+    pub(crate) fn set_ads(&self, watch: AdsWatch) {
+        self.lock().ads = Some(watch);
+    }
+
+    /// The topology list in the vendor's form, 64 bytes for each SubDevice; `None` before a plan is run.
+    #[must_use]
+    pub fn topology(&self) -> Option<Vec<u8>> {
+        let inner = self.lock();
+        let watch = inner.watch.as_ref()?;
+        let entries = watch.network_status().topology(watch.plan());
+        Some(entries.iter().flat_map(TopologyEntry::to_bytes).collect())
     }
 
     /// Something happened; gives the entries of the log that it leads to.
@@ -157,6 +174,7 @@ impl OnlineState {
         let group = inner.group.as_ref();
         report.group = group.map(|it| it.time(snapshot.leads_group, snapshot.ahead_of_group));
         report.gateway = inner.gateway.as_ref().map(GatewayWatch::report);
+        report.ads = inner.ads.as_ref().map(AdsWatch::report);
         Some(report)
     }
 

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::bring_up::BringUpReport;
 use super::group::GroupTime;
 use super::real_time::GrantedRealTime;
+use crate::ads::AdsReport;
 use crate::ethernet::EthernetReport;
 use crate::gateway::GatewayReport;
 use crate::serve::lateness::LatenessReport;
@@ -55,6 +56,9 @@ pub struct RunReport {
     /// What went through the mailbox gateway; `null`: there is none.
     #[serde(default)]
     pub gateway: Option<GatewayReport>,
+    /// What went through the ADS server; `null`: there is none.
+    #[serde(default)]
+    pub ads: Option<AdsReport>,
     /// What went through the virtual switch; `null`: no SubDevice speaks EoE, and no interface was wanted.
     #[serde(default)]
     pub ethernet: Option<EthernetReport>,

@@ -21,6 +21,7 @@ use super::group::NetworkPlace;
 use super::note::{Note, RunError};
 use super::real_time::{GrantedRealTime, RealTime};
 use super::report::{Counts, RunReport, SCHEMA, not_taken, of_plan};
+use crate::ads::AdsServer;
 use crate::ethernet::VirtualEthernet;
 use crate::gateway::MailboxGateway;
 use crate::part::PartFailure;
@@ -69,6 +70,7 @@ pub struct RunSession<A> {
     lateness: Lateness,
     socket: Option<ServiceSocket>,
     gateway: Option<MailboxGateway>,
+    ads: Option<AdsServer>,
     ethernet: Option<VirtualEthernet>,
     /// Left-out frames that were told, and nothing of more before that time.
     missed_told: (u64, Instant),
@@ -134,6 +136,7 @@ impl<A: Application> RunSession<A> {
             lateness: self.lateness.report(),
             host: (&self.granted).into(),
             gateway: self.gateway.as_ref().map(MailboxGateway::report),
+            ads: self.ads.as_ref().map(AdsServer::report),
             ethernet: self.ethernet.as_ref().and_then(VirtualEthernet::report),
             group: self.group.as_ref().map(|place| place.report(main)),
             not_taken: self
@@ -146,7 +149,7 @@ impl<A: Application> RunSession<A> {
         }
     }
 
-    /// Takes what is asked for through the socket and the mailbox gateway, and frames for SubDevices.
+    /// Takes what is asked for through the socket, the mailbox gateway and the ADS server, and frames for SubDevices.
     fn attend(&mut self, now: Instant, main: &mut MainDevice) {
         if let Some(gateway) = &mut self.gateway {
             gateway.turn(now, main);
@@ -154,9 +157,14 @@ impl<A: Application> RunSession<A> {
         if let Some(ethernet) = &mut self.ethernet {
             ethernet.turn(now, main);
         }
-        let Some(mut socket) = self.socket.take() else { return };
-        socket.turn(now, main, |main| self.report(now, main));
-        self.socket = Some(socket);
+        if let Some(mut ads) = self.ads.take() {
+            ads.turn(now, main, |main| self.report(now, main));
+            self.ads = Some(ads);
+        }
+        if let Some(mut socket) = self.socket.take() {
+            socket.turn(now, main, |main| self.report(now, main));
+            self.socket = Some(socket);
+        }
     }
 }
 
@@ -190,6 +198,9 @@ impl<A: Application> SessionHooks for RunSession<A> {
         if let Event::Served { ticket, result, .. } = &event {
             if let Some(socket) = &mut self.socket {
                 socket.served(*ticket, result);
+            }
+            if let Some(ads) = &mut self.ads {
+                ads.served(*ticket, result);
             }
             if let Some(gateway) = &mut self.gateway {
                 gateway.served(*ticket, result);
@@ -249,6 +260,8 @@ pub struct RunControls<'a> {
     pub socket: Option<ServiceSocket>,
     /// Mailbox messages of other programs.
     pub gateway: Option<MailboxGateway>,
+    /// Requests of other programs by ADS.
+    pub ads: Option<AdsServer>,
     /// Ethernet frames between SubDevices and this computer.
     pub ethernet: Option<VirtualEthernet>,
 }

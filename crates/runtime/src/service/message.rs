@@ -375,11 +375,11 @@ fn known(state: u8) -> Result<AlState, String> {
     found.ok_or_else(|| format!("state {state}: expected 1, 2, 3, 4 or 8"))
 }
 
-fn to_hex(bytes: &[u8]) -> String {
+pub(crate) fn to_hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn from_hex(text: &str) -> Result<Vec<u8>, String> {
+pub(crate) fn from_hex(text: &str) -> Result<Vec<u8>, String> {
     let wrong = || format!("`{text}`: expected pairs of hexadecimal digits, lowest byte first");
     if !text.bytes().all(|one| one.is_ascii_hexdigit()) || !text.len().is_multiple_of(2) {
         return Err(wrong());

@@ -29,12 +29,12 @@ use crate::run::report::RunReport;
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// What a MainDevice is asked.
-struct ServiceProtocol {
-    online: OnlineState,
+pub(crate) struct ServiceProtocol {
+    pub(crate) online: OnlineState,
 }
 
 /// What the thread that runs the line gives.
-enum ServiceReply {
+pub(crate) enum ServiceReply {
     Answer(Box<Answer>),
     /// The line as it is now.
     Snapshot(Box<Snapshot>),
@@ -93,9 +93,7 @@ const NOT_UP: &str = "the line is not up yet. Do: ask again";
 /// The socket of a MainDevice that runs. It is removed at the end.
 pub struct ServiceSocket {
     socket: ControlSocket<ServiceProtocol>,
-    /// Services that are being done, and who waits for them.
-    pending: Vec<(ServiceTicket, Asked<ServiceProtocol>)>,
-    rates: Rates,
+    services: PendingServices,
 }
 
 impl ServiceSocket {
@@ -106,7 +104,7 @@ impl ServiceSocket {
     /// When somebody listens there already, something else is there, or the system refuses.
     pub fn open(path: &Path, wake_handle: WakeHandle, online: OnlineState) -> io::Result<Self> {
         let socket = ControlSocket::open(path, wake_handle, ServiceProtocol { online })?;
-        Ok(Self { socket, pending: Vec::new(), rates: Rates::default() })
+        Ok(Self { socket, services: PendingServices::default() })
     }
 
     /// For whoever tells that nobody can ask any more.
@@ -122,30 +120,64 @@ impl ServiceSocket {
         main: &mut MainDevice,
         report: impl Fn(&MainDevice) -> RunReport,
     ) {
-        self.rates.turn(now, || main.statistics());
+        self.services.turn(now, main);
         while let Some(asked) = self.socket.poll() {
-            match asked.request.clone() {
-                Request::Status => asked.answer(Answer::status(report(main))),
-                Request::Online => {
-                    let snapshot = Snapshot::of(main, now, &self.rates);
-                    asked.give(ServiceReply::Snapshot(Box::new(snapshot)));
-                }
-                Request::Errors => asked.give(ServiceReply::Errors),
-                Request::Clear { errors, frames } => {
-                    if errors {
-                        main.clear_counts();
-                    }
-                    let frames = frames.then(|| main.statistics());
-                    asked.give(ServiceReply::Clear { errors, frames });
-                }
-                Request::Serve { no, service } => match prepared(main, no, service) {
-                    Ok((id, service)) => {
-                        let ticket = main.serve(now, id, service);
-                        self.pending.push((ticket, asked));
-                    }
-                    Err(why) => asked.answer(Answer::refusal(why)),
-                },
+            self.services.take(asked, now, main, &report);
+        }
+    }
+
+    /// A service is done.
+    pub(crate) fn served(
+        &mut self,
+        ticket: ServiceTicket,
+        result: &Result<ServiceAnswer, ServiceFailure>,
+    ) {
+        self.services.served(ticket, result);
+    }
+}
+
+/// Services that are being done by the thread that runs the line, and who waits for them.
+#[derive(Default)]
+pub(crate) struct PendingServices {
+    pending: Vec<(ServiceTicket, Asked<ServiceProtocol>)>,
+    rates: Rates,
+}
+
+impl PendingServices {
+    /// Time has passed.
+    pub(crate) fn turn(&mut self, now: Instant, main: &MainDevice) {
+        self.rates.turn(now, || main.statistics());
+    }
+
+    /// Does what is asked, or begins to. `report` tells how the run goes.
+    pub(crate) fn take(
+        &mut self,
+        asked: Asked<ServiceProtocol>,
+        now: Instant,
+        main: &mut MainDevice,
+        report: impl Fn(&MainDevice) -> RunReport,
+    ) {
+        match asked.request.clone() {
+            Request::Status => asked.answer(Answer::status(report(main))),
+            Request::Online => {
+                let snapshot = Snapshot::of(main, now, &self.rates);
+                asked.give(ServiceReply::Snapshot(Box::new(snapshot)));
             }
+            Request::Errors => asked.give(ServiceReply::Errors),
+            Request::Clear { errors, frames } => {
+                if errors {
+                    main.clear_counts();
+                }
+                let frames = frames.then(|| main.statistics());
+                asked.give(ServiceReply::Clear { errors, frames });
+            }
+            Request::Serve { no, service } => match prepared(main, no, service) {
+                Ok((id, service)) => {
+                    let ticket = main.serve(now, id, service);
+                    self.pending.push((ticket, asked));
+                }
+                Err(why) => asked.answer(Answer::refusal(why)),
+            },
         }
     }
 

@@ -5,7 +5,7 @@ use linesman_runtime::online::report::{
     Count, FrameCounts, OnlineDevice, OnlineGroup, OnlinePort, OnlineReport,
 };
 
-use crate::command::run::{ethernet, gateway};
+use crate::command::run::{ads, ethernet, gateway};
 use crate::output::{Output, Paint, Table};
 use crate::text::group::group_time;
 use crate::text::quantity::{count, grouped, time};
@@ -34,6 +34,9 @@ pub(super) fn text(report: &OnlineReport, last: Option<&OnlineReport>, output: &
     }
     if let Some(messages) = &report.gateway {
         text.push_str(&gateway::summary(messages));
+    }
+    if let Some(messages) = &report.ads {
+        text.push_str(&ads::summary(messages));
     }
     text.push_str(&log(report));
     text

@@ -9,9 +9,11 @@ use linesman_diagnosis::{Engine, Setup};
 use linesman_link::error::LinkError;
 use linesman_link::socket::WakeHandle;
 use linesman_proto::time::Span;
+use linesman_runtime::ads::AdsServer;
 use linesman_runtime::bundle::{BundleReceiver, BundleRecorder, RecordedEngine};
 use linesman_runtime::ethernet::VirtualEthernet;
-use linesman_runtime::gateway::{GatewayOptions, MailboxGateway};
+use linesman_runtime::gateway::MailboxGateway;
+use linesman_runtime::network_access::NetworkAccess;
 use linesman_runtime::online::OnlineState;
 use linesman_runtime::run::diagnosis_thread::DiagnosisObserver;
 use linesman_runtime::run::report::RunReport;
@@ -24,9 +26,10 @@ use linesman_runtime::stop::Stop;
 use linesman_runtime::transport::Transport;
 
 use super::Arguments;
+use super::ads::AdsOptions;
 use super::reporter::{self, RunReporter};
 use super::several::RunReports;
-use super::{ethernet, gateway};
+use super::{ads, ethernet, gateway};
 use crate::command::bundle::recording;
 use crate::command::line_access;
 use crate::exit::Status;
@@ -72,6 +75,7 @@ fn observer(setup: Setup, recorder: Option<BundleRecorder>) -> Box<dyn Diagnosis
 pub(super) struct Companions {
     socket: Option<ServiceSocket>,
     gateway: Option<MailboxGateway>,
+    ads: Option<AdsServer>,
     ethernet: Option<VirtualEthernet>,
     bundles: Option<(BundleRecorder, BundleReceiver)>,
 }
@@ -82,7 +86,8 @@ pub(super) struct NetworkRun {
     pub(super) options: SessionOptions,
     pub(super) image: Option<PathBuf>,
     pub(super) control: Option<PathBuf>,
-    pub(super) gateway_options: Option<GatewayOptions>,
+    pub(super) gateway_options: Option<NetworkAccess>,
+    pub(super) ads_options: Option<AdsOptions>,
     pub(super) companions: Companions,
     pub(super) online: OnlineState,
     pub(super) said: String,
@@ -101,10 +106,11 @@ impl NetworkRun {
         stop.wakes(&handle).map_err(line_access::no_wake_handle)?;
         let online = &self.online;
         let gateway = gateway::open(self.gateway_options.take(), handle.clone(), online.clone())?;
+        let ads = ads::open(self.ads_options.take(), handle.clone(), online.clone())?;
         let ethernet = arguments.ethernet.open(handle.clone())?;
         online.set_ethernet(ethernet.watch());
         let socket = socket(self.control.as_deref(), handle, online.clone())?;
-        self.companions = Companions { socket, gateway, ethernet: Some(ethernet), bundles };
+        self.companions = Companions { socket, gateway, ads, ethernet: Some(ethernet), bundles };
         Ok(())
     }
 }
@@ -170,10 +176,13 @@ pub(super) fn drive<L: Transport<Error = LinkError> + Send>(
         let mut threads = Vec::new();
         for (line, run) in runs {
             let NetworkRun { wanted, options, image, companions, said, reporter, .. } = run;
-            let Companions { socket, gateway, ethernet, bundles } = companions;
+            let Companions { socket, gateway, ads, ethernet, bundles } = companions;
             reporter.line(&said, output);
             if let Some(gateway) = &gateway {
                 reporter.line(&gateway::opened(gateway), output);
+            }
+            if let Some(ads) = &ads {
+                reporter.line(&ads::opened(ads), output);
             }
             if let Some(text) = ethernet.as_ref().and_then(ethernet::opened) {
                 reporter.line(&text, output);
@@ -182,7 +191,7 @@ pub(super) fn drive<L: Transport<Error = LinkError> + Send>(
             let socket_watch = socket.as_ref().map(ServiceSocket::watch);
             let (recorder, news) = bundles.unzip();
             running.push(RunningNetwork { reporter, told, news, socket_watch, is_over: false });
-            let beside = RunControls { stop, notes, socket, gateway, ethernet };
+            let beside = RunControls { stop, notes, socket, gateway, ads, ethernet };
             let judge = move |setup| observer(setup, recorder);
             threads.push(scope.spawn(move || {
                 let ended = match image {

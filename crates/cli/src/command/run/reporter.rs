@@ -396,6 +396,9 @@ pub(super) fn summary(report: &RunReport, paint: Paint) -> String {
     if let Some(gateway) = &report.gateway {
         text.push_str(&super::gateway::summary(gateway));
     }
+    if let Some(ads) = &report.ads {
+        text.push_str(&super::ads::summary(ads));
+    }
     if let Some(ethernet) = &report.ethernet {
         text.push_str(&super::ethernet::summary(ethernet));
     }

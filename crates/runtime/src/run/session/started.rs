@@ -66,7 +66,7 @@ pub fn start_observed<'a, L: Transport<Error = LinkError>, A: Application>(
     beside: RunControls<'a>,
     observer: impl FnOnce(Setup) -> Box<dyn DiagnosisObserver>,
 ) -> Result<StartedRun<'a, L, A>, RunError> {
-    let RunControls { stop, notes, socket, gateway, ethernet } = beside;
+    let RunControls { stop, notes, socket, gateway, ads, ethernet } = beside;
     let untold = Arc::<AtomicU64>::default();
     let observer = options.diagnose.clone().map(observer);
     let (diagnosis, judging) = match observer {
@@ -98,6 +98,7 @@ pub fn start_observed<'a, L: Transport<Error = LinkError>, A: Application>(
         lateness: Lateness::default(),
         socket,
         gateway,
+        ads,
         ethernet,
         missed_told: (0, Instant::ZERO),
         begun_at,

@@ -1,21 +1,21 @@
-//! Settings of the gateway, and whom it serves.
+//! Access to a server beside a run: where it listens, and whom it serves.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 use std::str::FromStr;
 
-/// How the gateway is to be opened.
+/// Access to a server.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct GatewayOptions {
-    /// Where it listens, by UDP and by TCP. Port 0: any that is free for both.
+pub struct NetworkAccess {
+    /// Where it listens. Port 0: any that is free.
     pub listen: SocketAddr,
     /// Who is served beside programs on this computer.
     pub allowed: Vec<AllowedHosts>,
-    /// Only what changes nothing is passed on: uploads of objects, and questions about dictionaries.
+    /// Only what changes nothing is done: uploads of objects, and questions about dictionaries.
     pub read_only: bool,
 }
 
-impl GatewayOptions {
+impl NetworkAccess {
     /// True if requests of this host are taken: it is this computer, or it is allowed.
     #[must_use]
     pub fn allows(&self, host: IpAddr) -> bool {
@@ -118,12 +118,12 @@ mod tests {
 
     #[test]
     fn only_this_computer_is_served_unless_others_are_allowed() {
-        let mut options = GatewayOptions {
+        let mut options = NetworkAccess {
             listen: "0.0.0.0:34980".parse().unwrap(),
             allowed: Vec::new(),
             read_only: false,
         };
-        let allows = |options: &GatewayOptions, host: &str| options.allows(host.parse().unwrap());
+        let allows = |options: &NetworkAccess, host: &str| options.allows(host.parse().unwrap());
         assert!(options.serves_nobody_else());
         assert!(allows(&options, "127.0.0.1") && allows(&options, "::1"));
         assert!(allows(&options, "::ffff:127.0.0.1"));
