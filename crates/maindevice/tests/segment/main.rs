@@ -21,6 +21,7 @@ mod mailbox;
 #[allow(clippy::disallowed_macros, reason = "it prints a table for people")]
 mod many;
 mod network_time;
+mod plotted_times;
 mod reference_clock;
 mod ring;
 mod ring_cuts;

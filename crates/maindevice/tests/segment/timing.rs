@@ -23,7 +23,7 @@ use crate::bench::Bench;
 use crate::clocks::start;
 use crate::mailbox::{put, upload};
 
-const PLANT: &str = r#"
+pub(crate) const PLANT: &str = r#"
 name = "timing"
 seed = 11
 [[device]]
@@ -39,14 +39,14 @@ name = "I1"
 type = "EL3102"
 on = "O1.B"
 "#;
-const CYCLE: Span = Span::ms(1);
+pub(crate) const CYCLE: Span = Span::ms(1);
 const OUTPUTS: u16 = 0x1C32;
-const INPUTS: u16 = 0x1C33;
+pub(crate) const INPUTS: u16 = 0x1C33;
 /// A long time, in cycles.
 const CYCLES: u32 = 4_000;
 
 /// A plan for this task, with SYNC0 for the SubDevices whose types `clocked` picks.
-fn plan(bench: &mut Bench, task: TaskOptions, clocked: impl Fn(&str) -> bool) -> Plan {
+pub(crate) fn plan(bench: &mut Bench, task: TaskOptions, clocked: impl Fn(&str) -> bool) -> Plan {
     let inventory = bench.scan();
     let mut planned = inventory.planned(AlState::Op);
     for device in planned.iter_mut().filter(|device| clocked(&device.profile.type_name)) {
@@ -66,13 +66,13 @@ fn terminals(kind: &str) -> bool {
     kind.starts_with("EL")
 }
 
-fn number(bench: &mut Bench, name: &str, index: u16, subindex: u8) -> u64 {
+pub(crate) fn number(bench: &mut Bench, name: &str, index: u16, subindex: u8) -> u64 {
     let bytes = upload(bench, name, index, subindex).unwrap_or_default();
     bytes.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
 }
 
 /// The times that the SubDevices measure of themselves, once they run.
-fn measured() -> Vec<SyncTimes> {
+pub(crate) fn measured() -> Vec<SyncTimes> {
     let mut bench = Bench::new(PLANT);
     let plan = plan(&mut bench, TaskOptions::new("cyclic", CYCLE), terminals);
     let devices = plan.devices.len();
@@ -229,7 +229,7 @@ fn outputs_come_their_shift_after_their_frame_where_inputs_are_fetched_earlier()
 }
 
 /// The third of these has outputs and inputs.
-const THREE_TASKS: &str = r#"
+pub(crate) const THREE_TASKS: &str = r#"
 name = "three tasks"
 seed = 11
 [[device]]
@@ -249,11 +249,11 @@ name = "B1"
 type = "EL7041"
 on = "I1.B"
 "#;
-const TASKS: [(&str, u64); 3] = [("IoTask", 16), ("PlcTask", 120), ("PlcTask3", 184)];
-const SLOW: Span = Span::ms(2);
+pub(crate) const TASKS: [(&str, u64); 3] = [("IoTask", 16), ("PlcTask", 120), ("PlcTask3", 184)];
+pub(crate) const SLOW: Span = Span::ms(2);
 
 /// Three tasks of 2 ms that exchange at their end, with one SubDevice in step with SYNC0 each.
-fn three_tasks(bench: &mut Bench, times: &[SyncTimes]) -> Plan {
+pub(crate) fn three_tasks(bench: &mut Bench, times: &[SyncTimes]) -> Plan {
     let inventory = bench.scan();
     let mut planned = inventory.planned(AlState::Op);
     for (device, (task, _)) in planned.iter_mut().skip(1).zip(TASKS) {
@@ -356,7 +356,7 @@ fn of_three_tasks_the_verdict_by_the_last_frame_agrees_with_what_the_subdevices_
 }
 
 /// Time within the cycle by the reference clock, in ns.
-fn phase(bench: &Bench, plan: &Plan, cycle: Span) -> i64 {
+pub(crate) fn phase(bench: &Bench, plan: &Plan, cycle: Span) -> i64 {
     let reference = plan.reference_clock().expect("a reference clock");
     let clock = bench.segment.controller(reference).expect("it is there");
     (clock.system_time(bench.now) % cycle.as_nanos()) as i64
@@ -375,7 +375,7 @@ fn when_changed<T: PartialEq>(bench: &mut Bench, plan: &Plan, seen: impl Fn(&Ben
 }
 
 /// The three buffers of a SyncManager, as they lie in the memory of its controller.
-fn buffers(bench: &Bench, plan: &Plan, id: DeviceId, manager: u8) -> Vec<u8> {
+pub(crate) fn buffers(bench: &Bench, plan: &Plan, id: DeviceId, manager: u8) -> Vec<u8> {
     let planned = &plan.devices[id.index()].sync_managers;
     let (_, config) = planned.iter().find(|(number, _)| *number == manager).expect("it has one");
     let (start, len) = (usize::from(config.start.0) - 0x1000, usize::from(config.length));
@@ -383,7 +383,12 @@ fn buffers(bench: &Bench, plan: &Plan, id: DeviceId, manager: u8) -> Vec<u8> {
 }
 
 /// When SYNC0 of a SubDevice comes next, within the cycle.
-fn next_sync0(bench: &mut Bench, plan: &Plan, station: StationAddress) -> i64 {
+pub(crate) fn next_sync0(
+    bench: &mut Bench,
+    plan: &Plan,
+    station: StationAddress,
+    cycle: Span,
+) -> i64 {
     let (target, register) = (Target::Station(station), register::START_TIME.address);
     bench.device.probe(bench.now, ProbeRequest { target, register, len: 8, write: None });
     let mut found = None;
@@ -396,7 +401,7 @@ fn next_sync0(bench: &mut Bench, plan: &Plan, station: StationAddress) -> i64 {
     let reference = plan.reference_clock().expect("a reference clock");
     let now = bench.segment.controller(reference).expect("it is there").system_time(bench.now);
     let ahead = (found.expect("an answer") as u32).wrapping_sub(now as u32) as i32;
-    (now.wrapping_add_signed(ahead.into()) % CYCLE.as_nanos()) as i64
+    (now.wrapping_add_signed(ahead.into()) % cycle.as_nanos()) as i64
 }
 
 // The plot is drawn from these numbers (`plan --timing --svg`).
@@ -430,7 +435,7 @@ fn frames_sync_reading_and_writing_of_each_clocked_subdevice_are_where_the_plot_
         let read = when_changed(&mut bench, &plan, |bench| bench.segment.signals().value(signal));
         let latest = planned.sync0_ns + planned.outputs_read.expect("known").as_nanos() as i64;
         is_within("outputs", read, planned.sync0_ns, latest);
-        let sync0 = next_sync0(&mut bench, &plan, plan.devices[1].station);
+        let sync0 = next_sync0(&mut bench, &plan, plan.devices[1].station, CYCLE);
         is_within("SYNC0", sync0, planned.sync0_ns, planned.sync0_ns);
 
         let (id, planned) = (DeviceId(2), inputs.times.as_ref().expect("times"));
@@ -439,7 +444,7 @@ fn frames_sync_reading_and_writing_of_each_clocked_subdevice_are_where_the_plot_
         let written = when_changed(&mut bench, &plan, |bench| buffers(bench, &plan, id, 3));
         let latest = planned.sync0_ns + planned.inputs_written.expect("known").as_nanos() as i64;
         is_within("inputs", written, planned.sync0_ns, latest);
-        let sync0 = next_sync0(&mut bench, &plan, plan.devices[2].station);
+        let sync0 = next_sync0(&mut bench, &plan, plan.devices[2].station, CYCLE);
         is_within("SYNC0", sync0, planned.sync0_ns, planned.sync0_ns);
         // The frame that fetches them is that of the next cycle.
         let range = plan.devices[2].inputs.clone();
