@@ -5,7 +5,9 @@
 //! all others follow the reference. Reference: S1 9.1.3.
 //!
 //! Of a clock outside only the speed is taken over: how far its time is ahead of that of the network stays as it was
-//! when it was first known, and is told to whoever reckons with both (S0 L799-805). What is known of it are pairs, a
+//! when it was first known, and is told to whoever reckons with both (S0 L799-805). The time that a program tells is taken
+//! over itself where it is near, as it is when the program told it before the start: the network is a clocked SubDevice of
+//! an upper one then, whose clock the program reads (S0 L909-943). What is known of it are pairs, a
 //! time of the network and the time outside at the same moment. From the first pairs follows the difference in speed.
 //! Then a proportional and an integral part hold the distance; they are slower than the loop in the reference clock,
 //! which takes some seconds to learn a new speed.
@@ -16,7 +18,7 @@ use linesman_proto::time::{DcTime, Instant, Span};
 use super::network_time::NetworkTime;
 use crate::network_group::{NetworkGroup, SPEED_PLACES};
 
-/// A time of this computer, or of the process, that is no further off is kept itself, not only its speed.
+/// A time of this computer, of the process, or of a program, that is no further off is kept itself, not only its speed.
 const SAME: u64 = 1_000_000;
 /// OutsidePairs from which the speed outside is taken.
 const FIRST_PAIRS: u32 = 512;
@@ -40,7 +42,8 @@ pub struct OutsideTime {
     /// How far the time outside is ahead of that of the network, in ns, as it was last read. To have the time
     /// outside, add it to a time of the network: nothing else does.
     pub ahead_ns: i64,
-    /// What that is more than when the speed outside became known, in ns: 0 where the speeds agree.
+    /// What that is more than when the speed outside became known, in ns: 0 where the speeds agree. Where the time itself
+    /// is taken over, it is the whole distance.
     pub deviation_ns: i64,
     /// The deviation was within 1 µs ten times in a row.
     pub in_step: bool,
@@ -168,8 +171,11 @@ impl LedTime {
 
     /// A pair: a time of the network, and how far the clock outside was ahead at that moment, in ns.
     pub(super) fn take_pair(&mut self, network: u64, ahead_ns: i64, cycle: Span) {
+        let takes_time =
+            matches!(self.source, LedBy::Outside(None)) && ahead_ns.unsigned_abs() <= SAME;
+        let to_keep = if takes_time { 0 } else { ahead_ns };
         let pairs = &mut self.pairs;
-        let kept = *pairs.kept.get_or_insert(ahead_ns);
+        let kept = *pairs.kept.get_or_insert(to_keep);
         let deviation = ahead_ns.wrapping_sub(kept);
         if deviation.abs() > SET_ANEW {
             *pairs = OutsidePairs { first: Some((network, ahead_ns)), ..OutsidePairs::default() };
@@ -186,7 +192,7 @@ impl LedTime {
             if pairs.count == FIRST_PAIRS && passed > 0 {
                 let gained = i128::from(ahead_ns.wrapping_sub(before)) << SPEED_PLACES;
                 held.add_speed((gained / i128::from(passed)) as i64);
-                pairs.kept = Some(ahead_ns);
+                pairs.kept = Some(to_keep);
             }
             return;
         }
@@ -273,6 +279,33 @@ mod tests {
             assert!(latest.in_step && latest.deviation_ns.abs() < 100, "{ppm} ppm: {latest:?}");
             assert!(latest.ahead_ns > 76_000_000_000, "the distance itself is not touched");
         }
+    }
+
+    #[test]
+    fn time_of_a_program_that_is_near_is_taken_itself() {
+        let taken = |ahead_ns: i64| {
+            let wanted = Some(TimeSource::Program);
+            let mut led = LedTime::new(wanted, None, None, DcTime(0)).expect("a source");
+            let (mut network, mut reference) = (NetworkTime::default(), 5_000_000_i64);
+            for number in 1..=40_000_i64 {
+                let at = Instant::from_nanos(number as u64 * 1_000_000);
+                reference += 1_000_020;
+                // 30 ppm slow.
+                let outside = 5_000_000 + ahead_ns + number * 999_970;
+                network.take(at, reference as u64, 20 * (1 << SPEED_PLACES) / 1_000_000);
+                if let Some(time) = led.time(at, &network, &[], CYCLE) {
+                    reference = time as i64;
+                }
+                led.take_pair(reference as u64, outside - reference, CYCLE);
+            }
+            led.outside().expect("pairs were told")
+        };
+        for ahead_ns in [-300_000, 0, 300_000] {
+            let OutsideTime { ahead_ns: left, deviation_ns, in_step } = taken(ahead_ns);
+            assert!(in_step && left.abs() < 100 && deviation_ns == left, "{ahead_ns}: {left} ns");
+        }
+        let far = taken(2_000_000);
+        assert!(far.in_step && far.ahead_ns > 1_900_000, "only its speed: {far:?}");
     }
 
     #[test]

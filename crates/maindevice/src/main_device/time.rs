@@ -1,5 +1,7 @@
 //! Time of the network for programs, and a time outside that they tell.
 
+use std::sync::Arc;
+
 use linesman_proto::time::{DcTime, Instant};
 
 use super::MainDevice;
@@ -49,10 +51,16 @@ impl MainDevice {
 
     /// Tells a time outside of the network, as it was at `at`, where the plan has the network follow a time that a program
     /// tells ([`TimeSource::Program`](linesman_config::plan::TimeSource)). To be told about once a cycle; times that are
-    /// off by their jitter are averaged.
+    /// off by their jitter are averaged. Told before the start, it is the time that clocks are set to, in place of
+    /// [`Options::clock_epoch`](crate::Options::clock_epoch). A time that is within 1 ms of that of the network is taken over
+    /// itself, of any other only the speed.
     pub fn tell_outside_time(&mut self, at: Instant, time: DcTime) {
-        if let Some(running) = &mut self.running {
-            running.cyclic.take_outside_time(at, time);
+        match &mut self.running {
+            Some(running) => running.cyclic.take_outside_time(at, time),
+            None => {
+                let options = Arc::make_mut(&mut self.options);
+                options.clock_epoch = DcTime(time.0.wrapping_sub(at.as_nanos()));
+            }
         }
     }
 

@@ -394,17 +394,27 @@ fn side_of_a_bridge_that_leads_is_set_in_it_and_the_form_of_time_stamps_selects_
     }
 }
 
-// proves: DC-18 partial: a program reads the clock that the upper network sets; only its speed is taken over
-#[test]
-fn local_network_takes_the_speed_of_an_upper_one_that_a_program_tells() {
-    let mut upper = bench_of(&PLANT.replace("-40.0", "20.0"));
+/// An upper network, 20 ppm fast and at another time than this computer, whose interface in this computer is its SubDevice
+/// 2, and a local one that follows the time that a program tells. The program reads the interface `told_before` the start, or
+/// only in the cycles. How far the local network is ahead of the upper one in ten seconds after a minute, at the least and
+/// most, and its bench.
+fn below_an_upper_network(told_before: bool) -> (i64, i64, Bench, Plan) {
+    let clock_epoch = DcTime(EPOCH.0 + 250_000_000);
+    let options = Options { clock_epoch, ..Options::default() };
+    let mut upper = Bench::with_options(&PLANT.replace("-40.0", "20.0"), options);
     let plan = by_project(&mut upper, |_| {});
     start(&mut upper, plan);
+    upper.run_for(Span::s(5));
     let mut local = bench_of(PLANT);
     let plan = by_project(&mut local, |project| {
         project.network.time_source = Some(TimeChoice::Program);
     });
-    start(&mut local, plan);
+    if told_before {
+        // The two benches have times of their own, as two computers have.
+        local.run_for(upper.now.since(local.now));
+        local.device.tell_outside_time(local.now, DcTime(shown(&upper, DeviceId(1))));
+    }
+    start(&mut local, plan.clone());
     let from = upper.now.max(local.now);
     for bench in [&mut upper, &mut local] {
         bench.run_for(from.since(bench.now));
@@ -412,18 +422,41 @@ fn local_network_takes_the_speed_of_an_upper_one_that_a_program_tells() {
     let mut step = || {
         upper.run_for(Span::ms(1));
         local.run_for(Span::ms(1));
-        // The interface of this computer to the upper network is its SubDevice 2.
         let time = DcTime(shown(&upper, DeviceId(1)));
         local.device.tell_outside_time(local.now, time);
         reference_time(&local).wrapping_sub(time.0) as i64
     };
-    for _ in 0..50_000 {
+    for _ in 0..60_000 {
         step();
     }
     let apart: Vec<i64> = (0..10_000).map(|_| step()).collect();
-    let (least, most) = (apart.iter().min().unwrap(), apart.iter().max().unwrap());
-    assert!(most - least < 500, "{least} to {most} ns apart within 10 s");
     assert!(local.device.outside_time().is_some_and(|one| one.in_step));
+    (apart.iter().copied().min().unwrap(), apart.iter().copied().max().unwrap(), local, plan)
+}
+
+#[test]
+fn local_network_takes_the_speed_of_an_upper_one_that_a_program_tells() {
+    let (least, most, ..) = below_an_upper_network(false);
+    assert!(most - least < 500, "{least} to {most} ns apart within 10 s");
+    assert!(most < -1_000_000, "its time is another one: {least} to {most} ns");
+}
+
+// S0 L909-943: the local network is in the time of the upper one, and its cycle in its phase.
+// proves: DC-18
+#[test]
+fn local_network_takes_the_time_and_the_phase_of_an_upper_one_that_is_told_before_its_start() {
+    let (least, most, mut local, _) = below_an_upper_network(true);
+    assert!(least > -500 && most < 500, "{least} to {most} ns ahead of the upper network");
+    // Its frames are there at multiples of the cycle, by the time that is that of the upper one.
+    for _ in 0..1_000 {
+        let next = local.device.next_cycle(0).unwrap();
+        local.run_for(next.since(local.now));
+        let phase = reference_time(&local).rem_euclid(CYCLE) as i64;
+        let phase = if phase > CYCLE as i64 / 2 { phase - CYCLE as i64 } else { phase };
+        assert!(phase.abs() < 5_000, "{phase} ns after a multiple of the cycle");
+        local.run_for(Span::us(10));
+    }
+    assert_eq!(local.state("O1"), "OP");
 }
 
 /// A network behind a port multiplier, whose clock is 23 ppm fast in all of them.
