@@ -48,7 +48,7 @@ pub(crate) trait TcpService: Send + Sync + 'static {
     ///
     /// # Errors
     /// When it breaks.
-    fn serve(&self, connection: Connection<'_>) -> io::Result<()>;
+    fn serve(&self, connection: ServedConnection<'_>) -> io::Result<()>;
 }
 
 /// Starts the thread that takes connections.
@@ -76,7 +76,7 @@ pub(crate) fn start<S: TcpService>(listener: TcpListener, service: S) -> io::Res
             let _ = thread::Builder::new().stack_size(STACK).spawn(move || {
                 // Whoever asked sees that the connection ends; the next one is served.
                 let _ = guard(S::CONNECTION, "it is closed", || {
-                    let _ = Connection::new(stream, peer, service.closed())
+                    let _ = ServedConnection::new(stream, peer, service.closed())
                         .and_then(|connection| service.serve(connection));
                 });
                 drop(place);
@@ -104,13 +104,13 @@ impl Drop for ConnectionPlace {
 }
 
 /// A connection.
-pub(crate) struct Connection<'a> {
+pub(crate) struct ServedConnection<'a> {
     stream: TcpStream,
     peer: SocketAddr,
     closed: &'a AtomicBool,
 }
 
-impl<'a> Connection<'a> {
+impl<'a> ServedConnection<'a> {
     fn new(stream: TcpStream, peer: SocketAddr, closed: &'a AtomicBool) -> io::Result<Self> {
         stream.set_nonblocking(false)?;
         stream.set_read_timeout(Some(LOOK_EVERY))?;

@@ -21,7 +21,7 @@ use crate::online::report::OnlineReport;
 use crate::request_rates::RequestRates;
 use crate::service::ServiceProtocol;
 use crate::service::message::{Answer, Request};
-use crate::tcp_server::{Connection, ConnectionRefusal, TcpService};
+use crate::tcp_server::{ConnectionRefusal, ServedConnection, TcpService};
 
 /// How long a connection may be silent: clients keep theirs open as long as they run.
 const IDLE: Duration = Duration::from_secs(30 * 60);
@@ -95,7 +95,7 @@ impl AdsShared {
     }
 
     /// The answer to a message: its frame; `None` to one that is not to be answered.
-    fn answer(&self, connection: &Connection<'_>, message: &[u8]) -> Option<Vec<u8>> {
+    fn answer(&self, connection: &ServedConnection<'_>, message: &[u8]) -> Option<Vec<u8>> {
         let refused = |header: &AmsHeader, code| {
             self.counts.answer(code);
             Some(header.answer(code).frame(&[]))
@@ -212,7 +212,7 @@ impl TcpService for AdsConnections {
     }
 
     /// Takes one message after another, until there is no more, or none that can be told from the next.
-    fn serve(&self, mut connection: Connection<'_>) -> io::Result<()> {
+    fn serve(&self, mut connection: ServedConnection<'_>) -> io::Result<()> {
         let Self(shared) = self;
         shared.counts.client();
         loop {

@@ -15,7 +15,7 @@ const MAX_DATA: usize = 1_486;
 
 /// Who is addressed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum DatagramTarget {
+pub(super) enum RegisterTarget {
     /// The SubDevice at this place: 0, 65535, 65534.
     Place(u16),
     /// The SubDevice with this station address.
@@ -26,7 +26,7 @@ pub(super) enum DatagramTarget {
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) struct RegisterDatagram {
     bytes: Vec<u8>,
-    pub(super) target: DatagramTarget,
+    pub(super) target: RegisterTarget,
     pub(super) register: RegisterAddress,
     /// True if it writes.
     pub(super) writes: bool,
@@ -44,8 +44,8 @@ impl RegisterDatagram {
         let (address, register) = (word(a0, a1), RegisterAddress(word(o0, o1)));
         let command = Command::from_code(command)?;
         let target = match command.addressing() {
-            Addressing::Position => DatagramTarget::Place(address),
-            Addressing::Station => DatagramTarget::Station(address),
+            Addressing::Position => RegisterTarget::Place(address),
+            Addressing::Station => RegisterTarget::Station(address),
             Addressing::None | Addressing::Broadcast | Addressing::Logical => return None,
         };
         let writes = matches!(command, Command::Apwr | Command::Fpwr);
@@ -63,7 +63,7 @@ impl RegisterDatagram {
     /// The datagram as it comes back: an address by place counted on by each of `passed` SubDevices, what was read, and
     /// the working counter.
     pub(super) fn returned(mut self, passed: u16, read: Option<&[u8]>, answered: bool) -> Vec<u8> {
-        if let DatagramTarget::Place(address) = self.target {
+        if let RegisterTarget::Place(address) = self.target {
             let counted = address.wrapping_add(passed).to_le_bytes();
             self.bytes.get_mut(2..4).into_iter().for_each(|to| to.copy_from_slice(&counted));
         }

@@ -7,7 +7,7 @@ use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use linesman_proto::state::AlState;
 
-use super::datagram::{DatagramTarget, RegisterDatagram};
+use super::datagram::{RegisterDatagram, RegisterTarget};
 use crate::gateway::own_objects;
 use crate::online::report::{OnlineDevice, OnlineIdentity, OnlineReport};
 use crate::service::message::{Answer, Asked, Request, from_hex, to_hex};
@@ -47,14 +47,14 @@ pub(super) struct AdsServices<'a, N> {
 }
 
 /// Answer to a service, or the code by which it is refused.
-type Outcome<T> = Result<T, AdsCode>;
+type AdsOutcome<T> = Result<T, AdsCode>;
 
 impl<N: AdsNetwork> AdsServices<'_, N> {
     /// The answer of a port.
     ///
     /// # Errors
     /// The code for the AMS header, when there is no such port.
-    pub(super) fn answer(&self, port: u16, request: &AdsRequest<'_>) -> Outcome<AdsAnswer> {
+    pub(super) fn answer(&self, port: u16, request: &AdsRequest<'_>) -> AdsOutcome<AdsAnswer> {
         let report = self.network.report();
         let outcome = match (port, report.as_deref()) {
             (AmsAddress::MAIN_DEVICE_PORT, report) => self.of_main_device(report, request),
@@ -79,7 +79,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         &self,
         report: Option<&OnlineReport>,
         request: &AdsRequest<'_>,
-    ) -> Outcome<AdsAnswer> {
+    ) -> AdsOutcome<AdsAnswer> {
         match *request {
             AdsRequest::DeviceInfo => return Ok(device_info("Linesman")),
             AdsRequest::Other(_) => return Err(AdsCode::SERVICE_NOT_SUPPORTED),
@@ -112,7 +112,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         }
     }
 
-    fn read(&self, report: &OnlineReport, group: u32, offset: u32) -> Outcome<Vec<u8>> {
+    fn read(&self, report: &OnlineReport, group: u32, offset: u32) -> AdsOutcome<Vec<u8>> {
         let of_each = |value: fn(&OnlineDevice) -> u32| -> Vec<u8> {
             report.devices.iter().flat_map(|device| value(device).to_le_bytes()).collect()
         };
@@ -150,7 +150,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         }
     }
 
-    fn write(&self, report: &OnlineReport, group: u32, offset: u32, data: &[u8]) -> Outcome<()> {
+    fn write(&self, report: &OnlineReport, group: u32, offset: u32, data: &[u8]) -> AdsOutcome<()> {
         let request = match (group, offset, data) {
             (index::MASTER_STATE, state, []) => {
                 self.may_write()?;
@@ -184,7 +184,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
     }
 
     /// Takes a SubDevice to the state that was written.
-    fn enter(&self, device: &OnlineDevice, data: &[u8]) -> Outcome<()> {
+    fn enter(&self, device: &OnlineDevice, data: &[u8]) -> AdsOutcome<()> {
         self.may_write()?;
         let word: [u8; STATE_LEN] = data.try_into().map_err(|_| AdsCode::BAD_SIZE)?;
         let word = u16::from_le_bytes(word);
@@ -195,7 +195,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         self.one(serve(device, Asked::Enter { state: state.bits() })).map(drop)
     }
 
-    fn of_device(&self, device: &OnlineDevice, request: &AdsRequest<'_>) -> Outcome<AdsAnswer> {
+    fn of_device(&self, device: &OnlineDevice, request: &AdsRequest<'_>) -> AdsOutcome<AdsAnswer> {
         match *request {
             AdsRequest::DeviceInfo => Ok(device_info(&device.name)),
             AdsRequest::State => {
@@ -239,7 +239,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
     }
 
     /// An access to an object, whose abort code is kept.
-    fn access(&self, device: &OnlineDevice, asked: Asked) -> Outcome<Vec<u8>> {
+    fn access(&self, device: &OnlineDevice, asked: Asked) -> AdsOutcome<Vec<u8>> {
         self.has_mailbox(device)?;
         let answer = self.first(serve(device, asked));
         let abort = answer.as_ref().ok().and_then(|answer| answer.refusal.as_ref());
@@ -248,13 +248,13 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         given(answer.as_ref())
     }
 
-    fn mailbox(&self, device: &OnlineDevice, asked: Asked) -> Outcome<Vec<u8>> {
+    fn mailbox(&self, device: &OnlineDevice, asked: Asked) -> AdsOutcome<Vec<u8>> {
         self.has_mailbox(device)?;
         self.one(serve(device, asked))
     }
 
     #[allow(clippy::unused_self, reason = "a step of the services")]
-    fn has_mailbox(&self, device: &OnlineDevice) -> Outcome<()> {
+    fn has_mailbox(&self, device: &OnlineDevice) -> AdsOutcome<()> {
         if device.mailbox.is_none() {
             return Err(AdsCode::SERVICE_NOT_SUPPORTED);
         }
@@ -265,7 +265,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
     }
 
     /// An object of the MainDevice itself.
-    fn own_object(&self, report: &OnlineReport, offset: u32) -> Outcome<Vec<u8>> {
+    fn own_object(&self, report: &OnlineReport, offset: u32) -> AdsOutcome<Vec<u8>> {
         let objects = own_objects(report);
         let (object, complete) = object(offset);
         let read = if complete {
@@ -291,14 +291,14 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
     }
 
     /// A datagram to one SubDevice, as the service for registers sends it.
-    fn datagram(&self, report: &OnlineReport, bytes: &[u8]) -> Outcome<Vec<u8>> {
+    fn datagram(&self, report: &OnlineReport, bytes: &[u8]) -> AdsOutcome<Vec<u8>> {
         let datagram = RegisterDatagram::parse(bytes).ok_or(AdsCode::BAD_DATA)?;
         if datagram.writes {
             self.may_write()?;
         }
         let device = report.devices.iter().find(|one| match datagram.target {
-            DatagramTarget::Place(place) => one.auto_increment == place,
-            DatagramTarget::Station(station) => one.station == station,
+            RegisterTarget::Place(place) => one.auto_increment == place,
+            RegisterTarget::Station(station) => one.station == station,
         });
         let passed = report.present as u16;
         // Nobody is there: it comes back as it went.
@@ -316,15 +316,15 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         })
     }
 
-    const fn may_write(&self) -> Outcome<()> {
+    const fn may_write(&self) -> AdsOutcome<()> {
         if self.read_only { Err(AdsCode::NOT_PERMITTED) } else { Ok(()) }
     }
 
-    fn first(&self, request: Request) -> Outcome<Answer> {
+    fn first(&self, request: Request) -> AdsOutcome<Answer> {
         self.network.ask(vec![request]).pop().unwrap_or(Err(AdsCode::BUSY))
     }
 
-    fn one(&self, request: Request) -> Outcome<Vec<u8>> {
+    fn one(&self, request: Request) -> AdsOutcome<Vec<u8>> {
         given(self.first(request).as_ref())
     }
 }
@@ -333,7 +333,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
 const SDO_ABORT: &str = "sdo-abort";
 
 /// The data that a service gave.
-fn given(answer: Result<&Answer, &AdsCode>) -> Outcome<Vec<u8>> {
+fn given(answer: Result<&Answer, &AdsCode>) -> AdsOutcome<Vec<u8>> {
     let answer = answer.map_err(|code| *code)?;
     if let Some(refusal) = &answer.refusal {
         return Err(match refusal.kind.as_str() {
@@ -391,7 +391,7 @@ fn serve(device: &OnlineDevice, service: Asked) -> Request {
 }
 
 /// A state that can be asked for.
-fn wanted(word: u16) -> Outcome<AlState> {
+fn wanted(word: u16) -> AdsOutcome<AlState> {
     let all = AlState::ALL.into_iter();
     all.clone().find(|state| u16::from(state.bits()) == word).ok_or(AdsCode::BAD_DATA)
 }
@@ -404,7 +404,7 @@ fn by_station(report: &OnlineReport, station: u16) -> Option<&OnlineDevice> {
     report.devices.iter().find(|device| device.station == station)
 }
 
-fn at(report: &OnlineReport, offset: u32) -> Outcome<&OnlineDevice> {
+fn at(report: &OnlineReport, offset: u32) -> AdsOutcome<&OnlineDevice> {
     let station = u16::try_from(offset).ok();
     station.and_then(|one| by_station(report, one)).ok_or(AdsCode::BAD_INDEX_OFFSET)
 }

@@ -13,7 +13,7 @@ use linesman_proto::mailbox::gateway;
 use super::counts::GatewayRefusal;
 use super::server::{GatewayServer, ObjectRequest, ReturnPath};
 use crate::network_access::NetworkAccess;
-use crate::tcp_server::{self, Connection, ConnectionRefusal, TcpService};
+use crate::tcp_server::{self, ConnectionRefusal, ServedConnection, TcpService};
 
 /// How long a connection may be silent.
 const IDLE: Duration = Duration::from_secs(60);
@@ -56,7 +56,7 @@ impl TcpService for GatewayConnections {
     }
 
     /// Takes one frame after another, until there is no more, or none that can be told from the next.
-    fn serve(&self, mut connection: Connection<'_>) -> io::Result<()> {
+    fn serve(&self, mut connection: ServedConnection<'_>) -> io::Result<()> {
         let server = &self.server;
         let client = server.clients.add();
         let mut buffer = [0; gateway::MAX_LEN];
@@ -92,7 +92,7 @@ impl TcpService for GatewayConnections {
 
 /// The frame whose first byte is there; `None` for one that ends too early, takes too long, or is none.
 fn rest<'a>(
-    connection: &mut Connection<'_>,
+    connection: &mut ServedConnection<'_>,
     buffer: &'a mut [u8; gateway::MAX_LEN],
 ) -> io::Result<Option<&'a [u8]>> {
     let began = Instant::now();
