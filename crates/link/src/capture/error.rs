@@ -23,10 +23,8 @@ pub struct CaptureError {
 impl CaptureError {
     pub(super) fn at_start(file: &Path, kind: CaptureErrorKind) -> Self {
         let is_pipe = file.as_os_str() == STANDARD_INPUT;
-        let kind = match kind {
-            CaptureErrorKind::Empty if is_pipe => CaptureErrorKind::NothingPiped,
-            other => other,
-        };
+        let is_empty = matches!(kind, CaptureErrorKind::Empty);
+        let kind = if is_empty && is_pipe { CaptureErrorKind::NothingPiped } else { kind };
         Self { file: file.to_path_buf(), offset: 0, kind }
     }
 }
