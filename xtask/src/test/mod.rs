@@ -74,6 +74,8 @@ struct Context<'a> {
     target: PathBuf,
     /// Where the steps write what their commands print.
     logs: PathBuf,
+    /// Recordings and device files that are not ours, where there are some.
+    data: Option<PathBuf>,
     /// What could not be installed, and why.
     missing: BTreeMap<&'static str, String>,
     /// What the steps have left out so far.
@@ -244,6 +246,7 @@ impl<'a> Context<'a> {
             options,
             target,
             logs,
+            data: data_folder(root),
             missing: BTreeMap::new(),
             skipped: RefCell::default(),
         })
@@ -256,6 +259,18 @@ impl<'a> Context<'a> {
 
     /// A command in the project's root that logs to `NAME.log`.
     fn command(&self, log: &str, program: impl AsRef<Path>, arguments: &[&str]) -> Run {
-        Run::new(self.root, self.logs.join(format!("{log}.log")), program.as_ref(), arguments)
+        let log = self.logs.join(format!("{log}.log"));
+        let run = Run::new(self.root, log, program.as_ref(), arguments);
+        match &self.data {
+            Some(data) => run.env("LINESMAN_DATA", data),
+            None => run,
+        }
     }
+}
+
+/// Recordings and device files that are not ours: where the environment says, else beside the project as the tests of the
+/// crates take them.
+fn data_folder(root: &Path) -> Option<PathBuf> {
+    let named = std::env::var_os("LINESMAN_DATA").map(PathBuf::from);
+    named.or_else(|| root.join("../shared/data").canonicalize().ok())
 }

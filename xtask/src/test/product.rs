@@ -72,7 +72,7 @@ pub(super) fn stories(context: &Context<'_>) -> Result<Outcome> {
     }
     stories.sort();
     // Stories about devices from their makers' files need those.
-    if std::env::var_os("LINESMAN_DATA").is_none() {
+    if context.data.is_none() {
         let needs_data = |name: &String| {
             let text = std::fs::read_to_string(context.root.join("scenarios").join(name));
             text.is_ok_and(|text| text.contains("$LINESMAN_DATA/"))
