@@ -34,7 +34,7 @@ pub(super) fn address(text: &str, port: u16) -> Result<SocketAddr, String> {
     let with_port = text.parse::<SocketAddr>().ok();
     let address = with_port.or_else(|| Some(SocketAddr::new(text.parse().ok()?, port)));
     address.ok_or_else(|| {
-        "expected an address of this computer, with a port or without: 127.0.0.1, 192.168.1.5:34980".to_owned()
+        format!("expected an address of this computer, with a port or without: 127.0.0.1, 192.168.1.5:{port}")
     })
 }
 
