@@ -1,4 +1,4 @@
-//! Server for connections: how many at a time, of whom, and how long one may be silent.
+//! Server for connections: their number at a time, whom they come from, and for how long one may be silent.
 
 use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
@@ -14,9 +14,9 @@ use crate::part::guard;
 const CONNECTIONS: usize = 64;
 /// Memory for the thread of one, in bytes: a run with real-time priority keeps all its memory in RAM.
 const STACK: usize = 256 * 1024;
-/// How long the other side may take to read an answer.
+/// Time that the other side may take to read an answer.
 const WRITE: Duration = Duration::from_secs(2);
-/// How often it is looked whether the server is closed.
+/// Interval at which the server is looked at, whether it is closed.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// Reason for which a connection is closed at once.
@@ -28,7 +28,7 @@ pub(crate) enum ConnectionRefusal {
     NotAllowed,
 }
 
-/// What is served on connections.
+/// Service on connections.
 pub(crate) trait TcpService: Send + Sync + 'static {
     /// Name of the thread that takes connections.
     const THREAD: &'static str;

@@ -23,16 +23,16 @@ use crate::service::ServiceProtocol;
 use crate::service::message::{Answer, Request};
 use crate::tcp_server::{ConnectionRefusal, ServedConnection, TcpService};
 
-/// How long a connection may be silent: clients keep theirs open as long as they run.
+/// Time that a connection may be silent: clients keep theirs open as long as they run.
 const IDLE: Duration = Duration::from_secs(30 * 60);
-/// How long a message may take from its first byte to its last.
+/// Time that a message may take from its first byte to its last.
 const MESSAGE: Duration = Duration::from_secs(5);
 /// So long a report is as it was: the thread that runs the line is asked no more often.
 const FRESH: Duration = Duration::from_millis(50);
 /// Requests that are out at once, when many SubDevices are asked for the same.
 const AT_ONCE: usize = 8;
 
-/// What all threads of the server share.
+/// State that all threads of the server share.
 pub(super) struct AdsShared {
     access: NetworkAccess,
     pub(super) listen: SocketAddr,

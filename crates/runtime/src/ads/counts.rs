@@ -12,7 +12,7 @@ pub(super) struct AdsCounts {
     inner: Mutex<CountedAds>,
 }
 
-/// What was counted.
+/// The counts themselves.
 #[derive(Clone, Default, Debug)]
 pub(super) struct CountedAds {
     pub(super) clients: u64,
@@ -52,7 +52,7 @@ impl AdsCounts {
     }
 }
 
-/// What went through the ADS server.
+/// Messages that went through the ADS server.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
