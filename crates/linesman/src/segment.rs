@@ -312,14 +312,7 @@ impl Segment {
             handoff: Rc::clone(&handoff),
         };
         let wanted = PlanSource::Plan(Box::new(plan));
-        let beside = RunControls {
-            stop: &self.stop,
-            notes,
-            socket: None,
-            gateway: None,
-            ads: None,
-            ethernet: None,
-        };
+        let beside = RunControls::new(&self.stop, notes);
         let started = running::start(self.line.transport(), wanted, served, &session, beside)?;
         Ok((started, id, handoff))
     }

@@ -58,14 +58,8 @@ fn driven<L: Transport<Error = LinkError>>(
         group: None,
     };
     let (notes, told) = sync_channel(NOTES);
-    let beside = RunControls {
-        stop: &Stop::default(),
-        notes,
-        socket: None,
-        gateway: None,
-        ads: None,
-        ethernet: None,
-    };
+    let stop = Stop::default();
+    let beside = RunControls::new(&stop, notes);
     let wanted = PlanChoices::default().as_found();
     (run_observed(line, wanted, application, &options, beside, observer), told)
 }

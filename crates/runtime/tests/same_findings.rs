@@ -113,14 +113,8 @@ fn in_run(file: &SegmentFile, cycle: Span, active: bool) -> Option<Diagnosis> {
         group: None,
     };
     let (notes, _told) = sync_channel(NOTES);
-    let beside = RunControls {
-        stop: &Stop::default(),
-        notes,
-        socket: None,
-        gateway: None,
-        ads: None,
-        ethernet: None,
-    };
+    let stop = Stop::default();
+    let beside = RunControls::new(&stop, notes);
     let choices = PlanChoices { cycle: Some(cycle), ..PlanChoices::default() };
     run(line, choices.as_found(), Idle, &options, beside).ok()?.report.diagnosis
 }

@@ -232,14 +232,8 @@ fn drive(line: Watched, wanted: PlanSource, program: impl Application, lasts: Op
         group: None,
     };
     let (notes, _told) = sync_channel(1);
-    let beside = RunControls {
-        stop: &Stop::default(),
-        notes,
-        socket: None,
-        gateway: None,
-        ads: None,
-        ethernet: None,
-    };
+    let stop = Stop::default();
+    let beside = RunControls::new(&stop, notes);
     let ended = run(line, wanted, program, &options, beside).unwrap();
     assert!(ended.error.is_none());
     let counts = ended.report.counts;

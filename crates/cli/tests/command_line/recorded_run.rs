@@ -117,14 +117,8 @@ fn record(folder: &FilePath, project: &str) -> std::path::PathBuf {
         group: None,
     };
     let (notes, _told) = sync_channel(1);
-    let beside = RunControls {
-        stop: &Stop::default(),
-        notes,
-        socket: None,
-        gateway: None,
-        ads: None,
-        ethernet: None,
-    };
+    let stop = Stop::default();
+    let beside = RunControls::new(&stop, notes);
     let ended = run(line, plan, Idle, &options, beside).unwrap();
     assert!(ended.error.is_none() && ended.report.reached_ns.is_some());
     let mut writer = PcapngWriter::new(File::create(&capture).unwrap(), "linesman").unwrap();

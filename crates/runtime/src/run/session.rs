@@ -266,6 +266,14 @@ pub struct RunControls<'a> {
     pub ethernet: Option<VirtualEthernet>,
 }
 
+impl<'a> RunControls<'a> {
+    /// Controls of a run of which no other program asks anything.
+    #[must_use]
+    pub const fn new(stop: &'a Stop, notes: SyncSender<Note>) -> Self {
+        Self { stop, notes, socket: None, gateway: None, ads: None, ethernet: None }
+    }
+}
+
 /// Runs a line until its time is over, `stop`, or the application has enough; then stops it: outputs
 /// to zero, SubDevices back to where they shall be left.
 ///
