@@ -13,7 +13,8 @@
 //! **What it means.** For a fall to INIT the supply was gone: for a moment (brown-out), or for longer
 //! (device or supply off). When several SubDevices fall at the same moment, they share the supply that
 //! failed. When all terminals of a coupler fall, or all from one of them to the end, and the coupler does not,
-//! it is the voltage of their terminal bus: an overload. A fall to another state without an error code is the doing of the firmware. The links that
+//! it is the voltage of their terminal bus: an overload. Without its load that is back at once: terminals that were away together for
+//! longer than a second have lost their supply. A fall to another state without an error code is the doing of the firmware. The links that
 //! the device lost meanwhile are listed beneath.
 //!
 //! **What to do.** Measure the supply of the SubDevice under load, at the device; look what is switched
