@@ -25,7 +25,7 @@ type = "EL7041"
 on = "K1.B"
 "#;
 const STEPPER: DeviceId = DeviceId(1);
-/// What is looked at once a µs is seen up to so much late; clocks and cycle are in step within some 100 ns, and the begin
+/// Times that are looked at once a µs are seen up to so much late; clocks and cycle are in step within some 100 ns, and the begin
 /// of the frame is that far off in any case.
 const EARLY_NS: i64 = 700;
 const LATE_NS: i64 = 1_500;
@@ -35,7 +35,7 @@ struct PlottedRun {
     bench: Bench,
     plan: Plan,
     times: CycleTimes,
-    /// When the cycle of the plot begins, by the reference clock.
+    /// Time at which the cycle of the plot begins, by the reference clock.
     begins_ns: i64,
 }
 
@@ -78,7 +78,7 @@ impl PlottedRun {
     }
 }
 
-/// How far a time is outside of what the plot has, in ns: 0 within; both may be cycles apart.
+/// Distance of a time from the span that the plot has, in ns: 0 within; both may be cycles apart.
 fn outside(at: i64, from: i64, to: i64) -> i64 {
     let cycle = CYCLE.as_nanos() as i64;
     let middle = i64::midpoint(from, to);
