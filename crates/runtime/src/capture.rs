@@ -26,7 +26,7 @@ pub struct Capture {
     source: FrameSource,
     clock: RunClock,
     files: RecordingFiles,
-    /// Where it was recorded inside the line by cards that add no records.
+    /// Links at which it was recorded inside the line by cards that add no records.
     tap: Option<CaptureTap>,
 }
 

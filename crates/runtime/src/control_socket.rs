@@ -152,7 +152,7 @@ impl<P: Protocol> RequestSender<P> {
 /// A request whose answer is waited for.
 pub(crate) struct SentRequest<P: Protocol>(Receiver<P::Reply>);
 
-/// What a connection's thread needs.
+/// Shared parts of the threads of connections.
 struct Connection<P: Protocol> {
     sender: RequestSender<P>,
     clients: AtomicUsize,

@@ -7,7 +7,7 @@ use std::str::FromStr;
 /// Access to a server.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct NetworkAccess {
-    /// Where it listens. Port 0: any that is free.
+    /// Address at which it listens. Port 0: any that is free.
     pub listen: SocketAddr,
     /// Who is served beside programs on this computer.
     pub allowed: Vec<AllowedHosts>,

@@ -14,7 +14,7 @@ const HOSTS: usize = 256;
 /// Requests that may come, refilled as time passes.
 #[derive(Clone, Copy, Debug)]
 struct Allowance {
-    /// How many are left, in thousandths.
+    /// Requests that are left, in thousandths.
     left: u64,
     at: Duration,
 }

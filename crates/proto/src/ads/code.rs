@@ -46,7 +46,7 @@ impl AdsCode {
     /// The device gave no answer in time.
     pub const TIMEOUT: Self = Self(0x719);
 
-    /// What is meant; `None` for a code that no service of Linesman gives.
+    /// Meaning in words; `None` for a code that no service of Linesman gives.
     #[must_use]
     pub const fn meaning(self) -> Option<&'static str> {
         Some(match self {

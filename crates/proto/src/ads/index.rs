@@ -20,9 +20,9 @@ pub const IDENTITY: u32 = 0x11;
 /// Damaged frames: sums of all SubDevices at offset 0, else by port of a station address; written without data they
 /// begin at 0.
 pub const CRC_COUNTS: u32 = 0x12;
-/// How often each SubDevice left a state by itself.
+/// Number of times that each SubDevice left a state by itself.
 pub const ABNORMAL_CHANGES: u32 = 0x13;
-/// How often each SubDevice stopped answering or came back.
+/// Number of times that each SubDevice stopped answering or came back.
 pub const PRESENCE_CHANGES: u32 = 0x14;
 /// Topology, 64 bytes for each SubDevice.
 pub const TOPOLOGY: u32 = 0x22;

@@ -20,15 +20,15 @@ const COMMAND: u16 = 0x0004;
 /// The AMS header of a request or of its answer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct AmsHeader {
-    /// Where it goes.
+    /// Receiver.
     pub target: AmsAddress,
-    /// Where it comes from.
+    /// Sender.
     pub source: AmsAddress,
     /// The command, by its number.
     pub command: u16,
     /// State flags: bit 0 an answer, bit 2 a command of ADS.
     pub flags: u16,
-    /// Why it did not reach its target; 0 in a request.
+    /// Reason for which it did not reach its target; 0 in a request.
     pub error: AdsCode,
     /// Number by which the client finds the answer again.
     pub invoke_id: u32,
@@ -124,7 +124,7 @@ impl AmsHeader {
     }
 }
 
-/// Why bytes are no AMS message.
+/// Reason for which bytes are no AMS message.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum AmsError {
     /// The AMS/TCP header announces something else: ports of a local router, say.

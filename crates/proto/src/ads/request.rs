@@ -52,7 +52,7 @@ impl AdsCommand {
     }
 }
 
-/// What a client asks.
+/// Request of a client.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum AdsRequest<'a> {
     /// Name and version.
@@ -65,7 +65,7 @@ pub enum AdsRequest<'a> {
         group: u32,
         /// Index offset.
         offset: u32,
-        /// How many at most.
+        /// Greatest number of bytes.
         len: u32,
     },
     /// Bytes to be written.
@@ -83,7 +83,7 @@ pub enum AdsRequest<'a> {
         group: u32,
         /// Index offset.
         offset: u32,
-        /// How many are read at most.
+        /// Greatest number of bytes that are read.
         len: u32,
         /// The bytes.
         data: &'a [u8],
@@ -165,7 +165,7 @@ fn words<const N: usize>(mut data: &[u8]) -> Option<([u32; N], &[u8])> {
     Some((words, data))
 }
 
-/// What a device answers.
+/// Answer of a device.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum AdsAnswer {
     /// Name and version.

@@ -27,7 +27,7 @@ use crate::tcp_server::{ConnectionRefusal, ServedConnection, TcpService};
 const IDLE: Duration = Duration::from_secs(30 * 60);
 /// Time that a message may take from its first byte to its last.
 const MESSAGE: Duration = Duration::from_secs(5);
-/// So long a report is as it was: the thread that runs the line is asked no more often.
+/// Age up to which a report is given again: the thread that runs the line is asked no more often.
 const FRESH: Duration = Duration::from_millis(50);
 /// Requests that are out at once, when many SubDevices are asked for the same.
 const AT_ONCE: usize = 8;

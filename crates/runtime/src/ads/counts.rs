@@ -57,11 +57,11 @@ impl AdsCounts {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AdsReport {
-    /// Where it listens: `127.0.0.1:48898`.
+    /// Address at which it listens: `127.0.0.1:48898`.
     pub listen: String,
     /// NetId of the MainDevice: `127.0.0.1.2.1`.
     pub net_id: String,
-    /// Whether only reading is allowed.
+    /// True if only reading is allowed.
     pub read_only: bool,
     /// Connections so far.
     pub clients: u64,

@@ -13,7 +13,7 @@ const COUNTER: usize = 2;
 /// Most bytes of data: those of a datagram in an Ethernet frame.
 const MAX_DATA: usize = 1_486;
 
-/// Who is addressed.
+/// SubDevice that is addressed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum RegisterTarget {
     /// The SubDevice at this place: 0, 65535, 65534.

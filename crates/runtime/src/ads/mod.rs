@@ -84,13 +84,13 @@ impl AdsServer {
         Ok(Self { shared, requests, services: PendingServices::default() })
     }
 
-    /// Where it listens.
+    /// Address at which it listens.
     #[must_use]
     pub fn listen(&self) -> SocketAddr {
         self.shared.listen
     }
 
-    /// What has gone through it.
+    /// Messages that have gone through it.
     #[must_use]
     pub fn report(&self) -> AdsReport {
         self.shared.report()

@@ -19,12 +19,12 @@ const ACKNOWLEDGE: u16 = 0x10;
 /// Objects of the MainDevice that describe SubDevices as planned; the vendor's structure of one ends at four bytes.
 const CONFIGURED: std::ops::RangeInclusive<u16> = 0x8000..=0x8FFF;
 
-/// What the services need of the network.
+/// Access of the services to the network.
 pub(super) trait AdsNetwork {
-    /// How the line is now; `None` before a plan is run.
+    /// State of the line now; `None` before a plan is run.
     fn report(&self) -> Option<Arc<OnlineReport>>;
 
-    /// What the MainDevice answers to each request.
+    /// Answers of the MainDevice, one to each request.
     fn ask(&self, requests: Vec<Request>) -> Vec<Result<Answer, AdsCode>>;
 
     /// The topology list in the vendor's form; `None` before a plan is run.
@@ -427,7 +427,7 @@ fn frame_counts(report: &OnlineReport) -> Vec<u8> {
     counts.iter().flat_map(|count| (*count as u32).to_le_bytes()).collect()
 }
 
-/// Who it is; who it should be before it was asked.
+/// Identity that it has told; the planned one before it was asked.
 fn identity(device: &OnlineDevice) -> Vec<u8> {
     let OnlineIdentity { vendor_id, product_code, revision, serial } =
         device.found.or(device.planned).unwrap_or_default();

@@ -68,7 +68,7 @@ pub struct OnlineReport {
     /// What goes through the mailbox gateway; `null`: none is open.
     #[serde(default)]
     pub gateway: Option<GatewayReport>,
-    /// What goes through the ADS server; `null`: none is open.
+    /// Messages that go through the ADS server; `null`: none is open.
     #[serde(default)]
     pub ads: Option<AdsReport>,
 }

@@ -56,7 +56,7 @@ pub struct RunReport {
     /// What went through the mailbox gateway; `null`: there is none.
     #[serde(default)]
     pub gateway: Option<GatewayReport>,
-    /// What went through the ADS server; `null`: there is none.
+    /// Messages that went through the ADS server; `null`: there is none.
     #[serde(default)]
     pub ads: Option<AdsReport>,
     /// What went through the virtual switch; `null`: no SubDevice speaks EoE, and no interface was wanted.

@@ -11,7 +11,7 @@ use linesman_runtime::capture::{Capture, CaptureTap, TapPlace};
 use crate::failure::Failure;
 use crate::text::quantity::count;
 
-/// Where a recording was taken.
+/// Link at which a recording was taken.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TapArguments {
     /// The capture was taken at this link inside the line, by a tap or a probe that adds no record: 3.B-4.A is the link
@@ -38,7 +38,7 @@ struct TapLink {
 }
 
 impl TapArguments {
-    /// Whether a place was named.
+    /// True if a place was named.
     pub(super) fn is_wanted(&self) -> bool {
         !self.links.is_empty()
     }
@@ -154,7 +154,7 @@ impl TapLinks {
         self.check_wiring(engine)
     }
 
-    /// Why nothing can be placed although a link was named; `None` where frames passed it both ways.
+    /// Reason for which nothing can be placed although a link was named; `None` where frames passed it both ways.
     pub(super) fn unused(&self, engine: &Engine) -> Option<String> {
         let model = engine.model(Network::default())?;
         let first = self.channels.first()?;

@@ -12,7 +12,7 @@ use super::gateway::{address, with_refusals};
 use crate::failure::Failure;
 use crate::text::quantity::count;
 
-/// What can be asked.
+/// Arguments of the ADS server.
 #[derive(clap::Args, Debug)]
 pub(super) struct AdsArguments {
     /// Answer other programs by ADS while the line runs: states, counts, identities, objects of SubDevices, as the
@@ -72,7 +72,7 @@ pub(super) fn open(
     Ok(Some(server))
 }
 
-/// Where it listens, for people.
+/// Address at which it listens, for people.
 pub(super) fn opened(server: &AdsServer) -> String {
     let report = server.report();
     let read_only = if report.read_only { ", read-only" } else { "" };
@@ -82,7 +82,7 @@ pub(super) fn opened(server: &AdsServer) -> String {
     )
 }
 
-/// What went through it, for people.
+/// Messages that went through it, for people.
 pub(in crate::command) fn summary(report: &AdsReport) -> String {
     let (requests, answers) = (count(report.requests, "request"), count(report.answers, "answer"));
     let clients = count(report.clients, "client");
