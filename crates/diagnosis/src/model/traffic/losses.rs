@@ -146,7 +146,7 @@ impl LostFrames {
         self.copies[card.index()]
     }
 
-    /// When those were sent whose copy did not come to `card`, in the order in which that was known, at most [`LOST_KEPT`].
+    /// Times of sending of those whose copy did not come to `card`, in the order in which that was known, at most [`LOST_KEPT`].
     #[must_use]
     pub const fn copy_times(&self, card: Path) -> &VecDeque<Instant> {
         &self.copy_times[card.index()]

@@ -106,7 +106,7 @@ impl PortOrder {
         }
     }
 
-    /// What the user says, without what was seen.
+    /// Number that the user says, without what was seen.
     pub(super) fn without_ports(&self) -> Self {
         Self { told: self.told, ..Self::default() }
     }
