@@ -88,7 +88,7 @@ pub enum ProbeOutcome {
     Wrong(String),
 }
 
-/// What records the frames.
+/// Device that records the frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ProbeKind {
     /// A probe that adds a record to each frame, and keeps damaged ones.

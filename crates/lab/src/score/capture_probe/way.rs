@@ -104,7 +104,7 @@ impl ProbedWay {
         found
     }
 
-    /// Where on the way a spot lies, from 0: a device at each hop that leaves it.
+    /// Positions of a spot on the way, from 0: a device at each hop that leaves it.
     fn orders(&self, spot: Spot) -> Vec<usize> {
         match spot {
             Spot::Hop(hop, HopStage::Output) => vec![10 * hop + 2],
@@ -117,7 +117,7 @@ impl ProbedWay {
         }
     }
 
-    /// What the site of a claim means on the way.
+    /// Spots on the way that the site of a claim names.
     pub(super) fn places(&self, site: Site) -> Vec<Spot> {
         let index = |end: End<DeviceId>| end.map(DeviceId::index);
         match site {
