@@ -10,6 +10,8 @@ use anyhow::{Context, Result};
 
 /// How often a running command is looked at.
 const LOOK: Duration = Duration::from_millis(50);
+/// The longest that a command runs that has no limit of its own: a build of everything on a busy machine with two cores.
+const LONGEST: Duration = Duration::from_mins(50);
 /// Lines of the log that are shown when a command fails.
 const TAIL: usize = 60;
 
@@ -37,7 +39,7 @@ impl Run {
         command.args(arguments).current_dir(root).stdin(Stdio::null());
         let name = program.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let said = format!("{name} {}", arguments.join(" "));
-        Self { command, said, log, limit: Duration::from_secs(1800) }
+        Self { command, said, log, limit: LONGEST }
     }
 
     pub(super) fn env(mut self, key: &str, value: impl AsRef<std::ffi::OsStr>) -> Self {
