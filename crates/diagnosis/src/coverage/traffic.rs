@@ -124,7 +124,7 @@ fn list_lost(basis: &Basis<'_>, all: &mut Assessment) {
         );
         all.lacks(Extent::InPart, gap);
     }
-    if traffic.losses.copies_gone().sum > 0 {
+    if traffic.losses.copies_gone() > 0 {
         let text = "both copies of a frame came back through the ring, and later one alone";
         let gap = Gap::new(Reason::FramesLost, text).essential().step(
             "read DL status (0x0110) and the error counters of all SubDevices: something swallows what one card sends",

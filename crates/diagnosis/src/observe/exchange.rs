@@ -39,9 +39,9 @@ pub struct Exchange<'a> {
     pub is_part: bool,
     /// The card to which its copy did not come, though those of others before and after it did.
     pub copy_lost: Option<Path>,
-    /// Whether one copy alone came back though both copies of requests before it had: the ring was whole, and something
-    /// swallows one of them since.
-    pub is_copy_gone: bool,
+    /// The card to which its copy did not come since the ring, of which both copies had come back before, is no
+    /// longer whole.
+    pub copy_gone: Option<Path>,
     /// The card by which the copy that came back had gone out; `None` where that is not known.
     pub sent_by: Option<Path>,
 }

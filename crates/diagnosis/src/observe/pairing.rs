@@ -77,6 +77,8 @@ pub struct Pairing {
     whole: u64,
     /// Whether that is so of the latest one of which it is known.
     was_whole: bool,
+    /// Whether the ring was whole once, and of a later request one copy alone came back.
+    has_lost_copies: bool,
     /// Returns that were taken for requests, since this was asked.
     mistaken: u64,
     /// Requests that were sent and not recorded, as their numbers tell, since this was asked.
@@ -188,7 +190,7 @@ impl Pairing {
                 is_cut_off: false,
                 is_part: false,
                 copy_lost: None,
-                is_copy_gone: false,
+                copy_gone: None,
                 sent_by: None,
             });
             self.returns += 1;
@@ -416,7 +418,7 @@ impl Pairing {
             is_cut_off: false,
             is_part: pending.is_part || is_alone,
             copy_lost: None,
-            is_copy_gone: false,
+            copy_gone: None,
             sent_by,
         });
         if is_last {

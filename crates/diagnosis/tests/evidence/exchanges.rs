@@ -403,11 +403,12 @@ fn copies_that_carry_nothing_may_vanish() {
     assert_eq!((report.network.lost.0, report.network.unanswered.0), (0, 0));
 }
 
-#[test]
-fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
+/// Copies that did not come to either card while all processed ones came to card B, and those to card A only where
+/// `is_whole` says so.
+fn copies_lost(cycles: u32, is_whole: impl Fn(u32) -> bool) -> [u64; 2] {
     let mut script = Script::new();
     script.is_live = true;
-    for cycle in 0..200 {
+    for cycle in 0..cycles {
         let processed = [lrw(0x0100_0000, 8, 6)];
         let untouched = [lrw(0x0100_0000, 8, 0)];
         for (path, back) in [(Path::A, 80_000), (Path::B, 79_999)] {
@@ -418,15 +419,25 @@ fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
         script.path = Some(Path::B);
         script.give_back(&processed);
         script.path = Some(Path::A);
-        // From cycle 150 on the ring is open: copies are lost, but no single ones.
-        if cycle != 100 && cycle < 150 {
+        if is_whole(cycle) {
             script.give_back(&untouched);
         }
         script.index = script.index.wrapping_add(1);
     }
     let model = script.engine.model(Network(0)).unwrap();
-    let lost = Path::ALL.map(|card| model.traffic.losses.copies(card).sum);
-    assert_eq!(lost, [1, 0]);
+    Path::ALL.map(|card| model.traffic.losses.copies(card).sum)
+}
+
+#[test]
+fn a_single_copy_that_is_lost_in_a_whole_ring_is_counted_at_its_card() {
+    // From cycle 150 on the ring is open: copies are lost, but no single ones.
+    assert_eq!(copies_lost(200, |cycle| cycle != 100 && cycle < 150), [1, 0]);
+}
+
+#[test]
+fn copies_that_are_lost_in_a_burst_are_counted_when_the_ring_proves_whole_again() {
+    assert_eq!(copies_lost(250, |cycle| !(150..190).contains(&cycle)), [40, 0]);
+    assert_eq!(copies_lost(250, |cycle| cycle < 150), [0, 0], "it stays open");
 }
 
 /// In a whole ring nobody processes what the second card sends: it asks by it alone to see which way frames come back.

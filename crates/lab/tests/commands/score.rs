@@ -31,6 +31,7 @@ fn cases_that_were_once_judged_wrongly_are_judged_right() {
         (223_384_000_048, "a dip of 0.6 ms on a line whose links need three seconds"),
         (223_384_000_150, "frames vanish in a line of 155 with a long cycle"),
         (223_384_000_158, "so many uneven frames that the first are not kept one by one"),
+        (981_271_127_104, "a burst of copies in a ring that the computer drops"),
     ];
     for (seed, what) in cases {
         let mut tally = Tally::new(options);

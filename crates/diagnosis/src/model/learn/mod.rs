@@ -109,6 +109,12 @@ impl Learner {
                 model.touch();
             }
         }
+        if exchange.is_last
+            && !exchange.earlier.is_empty()
+            && model.traffic.losses.end_copies_gone()
+        {
+            model.touch();
+        }
         let mut events = None;
         for answer in answers(exchange, request, reply) {
             let Some(answer) = answer else {
@@ -362,8 +368,8 @@ fn lost(model: &mut NetworkModel, exchange: &Exchange<'_>, request: &FrameCopy<'
         model.traffic.losses.record_copy(card, request.time);
         model.touch();
     }
-    if exchange.is_copy_gone && !model.is_lost_by_order(request.time) {
-        model.traffic.losses.record_copy_gone(request.time);
+    if let Some(card) = exchange.copy_gone.filter(|_| !model.is_lost_by_order(request.time)) {
+        model.traffic.losses.record_copy_gone(card, request.time);
         model.touch();
     }
     for (index, datagram) in view.datagrams().enumerate() {

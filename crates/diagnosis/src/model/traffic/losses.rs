@@ -20,7 +20,9 @@ pub struct LostFrames {
     times: VecDeque<Instant>,
     copies: [Tally; 2],
     copy_times: [VecDeque<Instant>; 2],
-    copies_gone: Tally,
+    /// Copies that do not come to each card since the ring is no longer whole.
+    copies_gone: [Tally; 2],
+    gone_times: [VecDeque<Instant>; 2],
     damaged: Tally,
     silences: VecDeque<Silence>,
     swallowed: VecDeque<Silence>,
@@ -97,9 +99,28 @@ impl LostFrames {
         note(&mut self.copy_times[card.index()], at);
     }
 
-    /// In a ring that was whole before, one copy alone came back of a request that was sent at `at`.
-    pub(crate) fn record_copy_gone(&mut self, at: Instant) {
-        self.copies_gone.add(1, at);
+    /// In a ring that was whole before and is not now, of a request that was sent at `at` the copy to `card` did not come.
+    pub(crate) fn record_copy_gone(&mut self, card: Path, at: Instant) {
+        self.copies_gone[card.index()].add(1, at);
+        note(&mut self.gone_times[card.index()], at);
+    }
+
+    /// Both copies of a request came back: what did not come before was lost, and nothing swallows it for good. True if
+    /// something was lost so.
+    pub(crate) fn end_copies_gone(&mut self) -> bool {
+        let mut has_lost = false;
+        for card in Path::ALL.map(Path::index) {
+            let gone = std::mem::take(&mut self.copies_gone[card]);
+            if let Some((first, last)) = gone.first.zip(gone.last) {
+                has_lost = true;
+                self.copies[card].add(1, first);
+                self.copies[card].add(gone.sum - 1, last);
+                while let Some(at) = self.gone_times[card].pop_front() {
+                    note(&mut self.copy_times[card], at);
+                }
+            }
+        }
+        has_lost
     }
 
     /// A frame came back with a wrong check sequence.
@@ -152,11 +173,11 @@ impl LostFrames {
         &self.copy_times[card.index()]
     }
 
-    /// In a ring that was whole before, frames of which one copy alone came back, with none after them of which both
-    /// did: some of them at least.
+    /// In a ring that was whole before, how many frames there were of which one copy alone came back, with none after
+    /// them of which both did.
     #[must_use]
-    pub const fn copies_gone(&self) -> Tally {
-        self.copies_gone
+    pub const fn copies_gone(&self) -> u64 {
+        self.copies_gone[0].sum + self.copies_gone[1].sum
     }
 
     /// Frames that came back with a wrong check sequence.

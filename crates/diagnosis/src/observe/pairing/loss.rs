@@ -1,6 +1,5 @@
 //! Requests that were given up.
 
-use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
 
 use super::{Exchange, Pairing, PendingRequest, gap};
@@ -43,15 +42,21 @@ impl Pairing {
         settle: &mut impl FnMut(&Exchange<'_>),
     ) {
         let Some(pending) = self.pending.get(index) else { return };
-        let (mut copy_lost, mut is_copy_gone) = (None, false);
+        let (mut copy_lost, mut copy_gone) = (None, None);
         if pending.out == 1 && !pending.sums.is_empty() && !is_cut_off {
+            let card = pending.came_to.other();
             // A ring that was opened loses all copies; one that is whole loses single ones.
-            let since = pending.whole_before.map(|before| self.whole - before);
-            if since.is_some_and(|since| since >= STILL_WHOLE) {
-                copy_lost = Some(if pending.came_to == Path::A { Path::B } else { Path::A });
-            } else {
-                is_copy_gone = since.is_some();
-                self.was_whole = false;
+            match pending.whole_before.map(|before| self.whole - before) {
+                Some(since) if since >= STILL_WHOLE => copy_lost = Some(card),
+                Some(_) => {
+                    copy_gone = Some(card);
+                    self.was_whole = false;
+                    self.has_lost_copies = true;
+                }
+                // It went out while copies of others got lost.
+                None if self.has_lost_copies && self.was_whole => copy_lost = Some(card),
+                None if self.has_lost_copies => copy_gone = Some(card),
+                None => {}
             }
         }
         settle(&Exchange {
@@ -63,7 +68,7 @@ impl Pairing {
             is_cut_off,
             is_part: pending.is_part,
             copy_lost,
-            is_copy_gone,
+            copy_gone,
             sent_by: None,
         });
         self.remove(index);

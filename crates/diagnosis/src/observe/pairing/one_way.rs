@@ -87,7 +87,7 @@ impl Pairing {
                 is_cut_off: false,
                 is_part: false,
                 copy_lost: None,
-                is_copy_gone: false,
+                copy_gone: None,
                 sent_by: None,
             });
             self.returns += 1;
