@@ -52,8 +52,10 @@ pub enum LastHop {
         hop: Hop,
         /// The card that counted.
         card: Path,
-        /// How many.
+        /// How many, beyond those that controllers counted.
         frames: u64,
+        /// How many of those that it counted controllers had counted, too.
+        carried: u64,
         /// When the card first reported some.
         first: Instant,
         /// When it last did.
@@ -408,6 +410,7 @@ impl ErrorWalk<'_, '_> {
             hop,
             card,
             frames,
+            carried: self.carried.frames,
             first,
             last,
         })

@@ -222,6 +222,14 @@ fn symptoms(input: &LocateInput<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
         {
             None
         }
+        // What controllers counted is taken off: other damage on the line explains none of these.
+        LastHop::Damaged { frames, carried: 1.., first, last, .. }
+            if *frames > CUT_OFF
+                && suspicion.damages.is_empty()
+                && !input.any_link_changed(*first, *last) =>
+        {
+            None
+        }
         LastHop::Damaged { .. } => Some(Symptom::CardErrors),
         LastHop::Unknown { is_beside: false, .. } => Some(Symptom::FramesLost),
         // The other damage, which explains lost frames, does not explain these.
