@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::address::StationAddress;
+
 /// A NetId: six bytes, written `192.168.1.5.2.1`.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub struct AmsNetId(pub [u8; 6]);
@@ -18,6 +20,14 @@ impl AmsNetId {
     #[must_use]
     pub const fn of_main_device([a, b, c, d]: [u8; 4]) -> Self {
         Self([a, b, c, d, 2, 1])
+    }
+
+    /// NetId of the SubDevice with this station address where no plan gives it one: 127.0.0.1, then the address, high
+    /// byte first. A NetId is chosen freely, and is to be unique.
+    #[must_use]
+    pub const fn of_sub_device(station: StationAddress) -> Self {
+        let [high, low] = station.value().to_be_bytes();
+        Self([127, 0, 0, 1, high, low])
     }
 }
 
@@ -89,6 +99,8 @@ mod tests {
         let net_id: AmsNetId = "169.254.215.231.2.1".parse().unwrap();
         assert_eq!(net_id, AmsNetId::of_main_device([169, 254, 215, 231]));
         assert_eq!(net_id.to_string(), "169.254.215.231.2.1");
+        let of_sub_device = AmsNetId::of_sub_device(StationAddress(0x1004));
+        assert_eq!(of_sub_device.to_string(), "127.0.0.1.16.4");
         for wrong in [
             "",
             "1.2.3.4",

@@ -9,6 +9,8 @@ use crate::mailbox::abort_code::SdoAbortCode;
 pub struct AdsCode(pub u32);
 
 impl AdsCode {
+    /// Bytes of a code.
+    pub const LEN: usize = 4;
     /// No error.
     pub const OK: Self = Self(0);
     /// The NetId has no such port.
@@ -70,6 +72,29 @@ impl AdsCode {
             Self::TIMEOUT => "device timeout",
             Self(_) => return None,
         })
+    }
+
+    /// What to do about it, in one sentence with a full stop.
+    #[must_use]
+    pub const fn action(self) -> &'static str {
+        match self {
+            Self::PORT_NOT_FOUND => "Take the AMS port that the manual of the SubDevice names.",
+            Self::MACHINE_NOT_FOUND => {
+                "Ask with the NetId that was written to the SubDevice, or write it anew."
+            }
+            Self::UNKNOWN_COMMAND | Self::SERVICE_NOT_SUPPORTED => {
+                "Look into the manual for the commands of ADS that the SubDevice takes."
+            }
+            Self::BAD_INDEX_GROUP | Self::BAD_INDEX_OFFSET | Self::NOT_FOUND => {
+                "Check index group and offset: objects are in group 0xF302, offset index * 65536 + subindex."
+            }
+            Self::NOT_PERMITTED => "Check whether it can be read or written, and in which state.",
+            Self::BAD_LENGTH | Self::BAD_SIZE => "Check the number of bytes.",
+            Self::BAD_DATA => "Check the value against its limits.",
+            Self::NOT_READY | Self::BUSY | Self::TIMEOUT => "Wait a moment, then repeat.",
+            Self::INVALID_STATE => "Take it to the state that the manual asks for, then repeat.",
+            Self(_) => "Look the code up in the manual of the SubDevice.",
+        }
     }
 
     /// The code by which an abort of an SDO transfer is told; the abort code itself is read apart

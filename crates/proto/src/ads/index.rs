@@ -3,6 +3,15 @@
 //! Reference: Beckhoff Information System, library Tc2_EtherCAT (function blocks `FB_Ec...`), and public clients of it:
 //! Beckhoff/ADS (`adstool`), kimblad/TwinSharp, DiamondLightSource/fastcs-catio.
 
+use crate::mailbox::coe::{ObjectAddress, ObjectIndex};
+
+/// Settings of an AoE SubDevice's own address.
+///
+/// The index and [`OWN_NET_ID_OFFSET`] are those of ETG.1020 (AoE, "Set NetId"), taken from memory: no public text was
+/// found that names them (`docs/SOURCES.md`).
+pub const OWN_NET_ID: u32 = 0x01;
+/// Offset of [`OWN_NET_ID`] at which the NetId, six bytes, is written.
+pub const OWN_NET_ID_OFFSET: u32 = 0x03;
 /// State of the MainDevice: read at offset [`MASTER_STATE_OFFSET`]; written, the offset is the state.
 pub const MASTER_STATE: u32 = 0x03;
 /// Offset at which [`MASTER_STATE`] is read.
@@ -43,3 +52,12 @@ pub const LAST_SDO_ERROR: u32 = 0xF303;
 /// Elements of identification numbers by SoE: number in bits 0 to 15 of the offset, element in bits 16 to 23, drive in
 /// bits 24 to 26.
 pub const IDN: u32 = 0xF420;
+
+/// The object of an offset of [`SDO`], and whether all its entries are meant.
+#[must_use]
+pub const fn object(offset: u32) -> (ObjectAddress, bool) {
+    let [subindex, flags, low, high] = offset.to_le_bytes();
+    let index = ObjectIndex(u16::from_le_bytes([low, high]));
+    let complete = (flags as u32) << 8 & SDO_COMPLETE != 0;
+    (ObjectAddress { index, subindex }, complete)
+}

@@ -87,23 +87,38 @@ impl AmsHeader {
         self.flags & (RESPONSE | COMMAND) == COMMAND
     }
 
+    /// True if it answers a request of ADS.
+    #[must_use]
+    pub const fn is_answer(&self) -> bool {
+        self.flags & (RESPONSE | COMMAND) == RESPONSE | COMMAND
+    }
+
+    /// The message with this header, as a mailbox carries it: without an AMS/TCP header.
+    #[must_use]
+    pub fn message(&self, data: &[u8]) -> Vec<u8> {
+        self.behind(Vec::with_capacity(AMS_HEADER_LEN + data.len()), data)
+    }
+
     /// The frame of a message with this header, the AMS/TCP header included.
     #[must_use]
     pub fn frame(&self, data: &[u8]) -> Vec<u8> {
-        // Whoever calls has no more than `MAX_AMS_LEN`.
-        let len = |bytes: usize| (bytes as u32).to_le_bytes();
         let mut frame = Vec::with_capacity(AMS_TCP_HEADER_LEN + AMS_HEADER_LEN + data.len());
         frame.extend_from_slice(&[0, 0]);
-        frame.extend_from_slice(&len(AMS_HEADER_LEN + data.len()));
-        frame.extend_from_slice(&self.target.to_bytes());
-        frame.extend_from_slice(&self.source.to_bytes());
-        frame.extend_from_slice(&self.command.to_le_bytes());
-        frame.extend_from_slice(&self.flags.to_le_bytes());
-        frame.extend_from_slice(&len(data.len()));
-        frame.extend_from_slice(&self.error.0.to_le_bytes());
-        frame.extend_from_slice(&self.invoke_id.to_le_bytes());
-        frame.extend_from_slice(data);
-        frame
+        frame.extend_from_slice(&len_word(AMS_HEADER_LEN + data.len()));
+        self.behind(frame, data)
+    }
+
+    /// The message behind what is there.
+    fn behind(&self, mut bytes: Vec<u8>, data: &[u8]) -> Vec<u8> {
+        bytes.extend_from_slice(&self.target.to_bytes());
+        bytes.extend_from_slice(&self.source.to_bytes());
+        bytes.extend_from_slice(&self.command.to_le_bytes());
+        bytes.extend_from_slice(&self.flags.to_le_bytes());
+        bytes.extend_from_slice(&len_word(data.len()));
+        bytes.extend_from_slice(&self.error.0.to_le_bytes());
+        bytes.extend_from_slice(&self.invoke_id.to_le_bytes());
+        bytes.extend_from_slice(data);
+        bytes
     }
 
     /// The header of a request.
@@ -122,6 +137,11 @@ impl AmsHeader {
     pub const fn answer(&self, error: AdsCode) -> Self {
         Self { target: self.source, source: self.target, flags: COMMAND | RESPONSE, error, ..*self }
     }
+}
+
+/// A length as headers have it; whoever calls has no more than [`MAX_AMS_LEN`].
+const fn len_word(len: usize) -> [u8; 4] {
+    (len as u32).to_le_bytes()
 }
 
 /// Reason for which bytes are no AMS message.
@@ -183,10 +203,12 @@ mod tests {
         assert!(header.is_request());
         assert_eq!(data, [6, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0]);
         assert_eq!(header.frame(data), REQUEST);
+        assert_eq!(header.message(data), REQUEST[AMS_TCP_HEADER_LEN..]);
         let answer = header.answer(AdsCode::PORT_NOT_FOUND);
         assert_eq!((answer.target, answer.source, answer.flags), (source, target, 5));
         assert_eq!((answer.error, answer.invoke_id), (AdsCode(6), 5));
         assert!(!answer.is_request());
+        assert!(answer.is_answer() && !header.is_answer());
     }
 
     #[test]

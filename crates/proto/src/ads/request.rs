@@ -1,5 +1,7 @@
 //! Commands: what is asked, and what is answered.
 
+use std::fmt;
+
 use super::code::AdsCode;
 
 /// A command by its number.
@@ -49,6 +51,22 @@ impl AdsCommand {
     #[must_use]
     pub const fn number(self) -> u16 {
         self as u16 + 1
+    }
+}
+
+impl fmt::Display for AdsCommand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::ReadDeviceInfo => "read device info",
+            Self::Read => "read",
+            Self::Write => "write",
+            Self::ReadState => "read state",
+            Self::WriteControl => "write control",
+            Self::AddNotification => "add notification",
+            Self::DeleteNotification => "delete notification",
+            Self::Notification => "notification",
+            Self::ReadWrite => "read and write",
+        })
     }
 }
 
@@ -211,6 +229,67 @@ impl AdsAnswer {
         }
     }
 
+    /// The answer to a command, from its data.
+    ///
+    /// # Errors
+    /// [`AdsAnswerError`] when they are shorter or longer than an answer to this command is.
+    pub fn parse(command: AdsCommand, data: &[u8]) -> Result<Self, AdsAnswerError> {
+        let len = data.len();
+        let wrong = |expected| AdsAnswerError { command, expected, len };
+        let (result, rest) = words::<1>(data).ok_or_else(|| wrong("the result, 4 bytes"))?;
+        let code = AdsCode(result[0]);
+        if code != AdsCode::OK {
+            return Ok(Self::Refused(code));
+        }
+        match (command, rest) {
+            (AdsCommand::ReadDeviceInfo, [major, minor, low, high, name @ ..])
+                if name.len() == 16 =>
+            {
+                let name = name.split(|byte| *byte == 0).next().unwrap_or_default();
+                Ok(Self::DeviceInfo {
+                    major: *major,
+                    minor: *minor,
+                    build: u16::from_le_bytes([*low, *high]),
+                    name: String::from_utf8_lossy(name).into_owned(),
+                })
+            }
+            (AdsCommand::ReadDeviceInfo, _) => Err(wrong("the result, version and name, 24 bytes")),
+            (AdsCommand::ReadState, [a, b, c, d]) => Ok(Self::State {
+                ads: u16::from_le_bytes([*a, *b]),
+                device: u16::from_le_bytes([*c, *d]),
+            }),
+            (AdsCommand::ReadState, _) => Err(wrong("the result and two states, 8 bytes")),
+            (AdsCommand::Read | AdsCommand::ReadWrite | AdsCommand::AddNotification, rest) => {
+                match words(rest) {
+                    // The answer to a notification has a handle in place of a length.
+                    Some(([_], [])) if command == AdsCommand::AddNotification => {
+                        Ok(Self::Read(rest.to_vec()))
+                    }
+                    Some(([len], read))
+                        if command != AdsCommand::AddNotification && fits(len, read) =>
+                    {
+                        Ok(Self::Read(read.to_vec()))
+                    }
+                    _ => Err(wrong("the result, a length and as many bytes")),
+                }
+            }
+            (
+                AdsCommand::Write
+                | AdsCommand::WriteControl
+                | AdsCommand::DeleteNotification
+                | AdsCommand::Notification,
+                [],
+            ) => Ok(Self::Done),
+            (
+                AdsCommand::Write
+                | AdsCommand::WriteControl
+                | AdsCommand::DeleteNotification
+                | AdsCommand::Notification,
+                _,
+            ) => Err(wrong("the result, 4 bytes")),
+        }
+    }
+
     /// The data that answer a request. One that is refused has what others have, all 0 or empty.
     #[must_use]
     pub fn to_bytes(&self, command: u16) -> Vec<u8> {
@@ -258,6 +337,18 @@ impl AdsAnswer {
     }
 }
 
+/// Reason for which data are no answer to a command.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{len} bytes answer ADS command {}, expected {expected}", .command.number())]
+pub struct AdsAnswerError {
+    /// The command that was asked.
+    pub command: AdsCommand,
+    /// What its answer is.
+    pub expected: &'static str,
+    /// Bytes there were.
+    pub len: usize,
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -302,6 +393,34 @@ mod tests {
             let bytes = refused.to_bytes(command);
             assert_eq!((&bytes[..4], bytes.len()), (&[2, 7, 0, 0][..], len), "{command}");
         }
+    }
+
+    #[test]
+    fn answers_are_read_as_they_are_written() {
+        let info =
+            AdsAnswer::DeviceInfo { major: 1, minor: 2, build: 3, name: "EL6692".to_owned() };
+        let state = AdsAnswer::State { ads: AdsAnswer::RUN, device: 8 };
+        let table = [
+            (AdsCommand::ReadDeviceInfo, info),
+            (AdsCommand::ReadState, state),
+            (AdsCommand::Read, AdsAnswer::Read(vec![1, 2, 3])),
+            (AdsCommand::ReadWrite, AdsAnswer::Read(Vec::new())),
+            (AdsCommand::Write, AdsAnswer::Done),
+            (AdsCommand::Read, AdsAnswer::Refused(AdsCode::NOT_FOUND)),
+        ];
+        for (command, answer) in table {
+            let bytes = answer.to_bytes(command.number());
+            assert_eq!(AdsAnswer::parse(command, &bytes), Ok(answer.clone()));
+            let longer = [&bytes[..], &[0]].concat();
+            let refused = matches!(answer, AdsAnswer::Refused(_));
+            assert_eq!(AdsAnswer::parse(command, &longer).is_ok(), refused, "{answer:?}");
+            for len in 0..4 {
+                let error = AdsAnswer::parse(command, &bytes[..len]).unwrap_err();
+                assert!(error.to_string().contains("expected the result"), "{error}");
+            }
+        }
+        // Three bytes are announced, two are there.
+        assert!(AdsAnswer::parse(AdsCommand::Read, &[0, 0, 0, 0, 3, 0, 0, 0, 1, 2]).is_err());
     }
 
     proptest! {
