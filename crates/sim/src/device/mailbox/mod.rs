@@ -1,9 +1,10 @@
 //! The mailbox of a SubDevice: takes messages, answers them, repeats what was lost.
 //!
-//! Read first: ETG.1000.4 (mailbox), ETG.1000.6 (CoE, EoE, FoE). SyncManager 0 brings requests,
+//! Read first: ETG.1000.4 (mailbox), ETG.1000.6 (CoE, EoE, FoE, SoE, VoE), ETG.1020 (AoE). SyncManager 0 brings requests,
 //! SyncManager 1 takes answers. One request is worked on at a time; the next stays in its
 //! SyncManager, which tells the MainDevice to wait.
 
+mod aoe;
 mod coe;
 mod eoe;
 mod foe;
@@ -11,6 +12,7 @@ mod information;
 mod object_server;
 mod outbox;
 mod soe;
+mod voe;
 
 use std::collections::VecDeque;
 
@@ -22,6 +24,7 @@ use linesman_proto::sii::Protocols;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
+use self::aoe::AdsServer;
 use self::coe::CoeServer;
 use self::eoe::EoePort;
 pub use self::eoe::FragmentsLeftOut;
@@ -64,6 +67,7 @@ pub struct Served<'a> {
 #[derive(Debug)]
 pub struct Mailbox {
     protocols: Protocols,
+    aoe: AdsServer,
     coe: CoeServer,
     eoe: EoePort,
     foe: FoeServer,
@@ -82,6 +86,7 @@ impl Mailbox {
     pub fn new(response_time: Span, protocols: Protocols) -> Self {
         Self {
             protocols,
+            aoe: AdsServer::default(),
             coe: CoeServer::default(),
             eoe: EoePort::default(),
             foe: FoeServer::default(),
@@ -230,6 +235,12 @@ impl Mailbox {
         let answers = match header.kind {
             MailboxType::Coe if !boots && self.protocols.has(Protocols::COE) => {
                 self.coe.answer(message.data, served, answer_room(pdi))
+            }
+            MailboxType::Aoe if !boots && self.protocols.has(Protocols::AOE) => {
+                self.aoe.answer(message.data, served, answer_room(pdi))
+            }
+            MailboxType::Voe if !boots && self.protocols.has(Protocols::VOE) => {
+                voe::answer(message.data, served)
             }
             MailboxType::Foe if !served.files.is_empty() => {
                 let limits =
