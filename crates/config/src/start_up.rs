@@ -7,10 +7,12 @@
 use std::fmt;
 
 use linesman_proto::address::RegisterAddress;
+use linesman_proto::ads::{AdsCommand, AdsRequest, AmsAddress, AmsNetId, index};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::mailbox::eoe::IpParameters;
 use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::state::AlState;
+use linesman_proto::time::Span;
 
 /// One command.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -54,6 +56,33 @@ pub enum StartUpAction {
         /// What is written.
         data: Vec<u8>,
     },
+    /// Asks by ADS (AoE), such as for the NetId that the device is to have; when, as for CoE.
+    Ads {
+        /// Receiver.
+        target: AmsAddress,
+        /// Sender.
+        source: AmsAddress,
+        /// What is asked.
+        command: AdsCommand,
+        /// What follows the AMS header.
+        data: Vec<u8>,
+    },
+    /// Brings a file by FoE; when, as for CoE.
+    WriteFile {
+        /// As the device is to know it.
+        name: String,
+        /// 0 for none.
+        password: u32,
+        /// The file.
+        data: Vec<u8>,
+    },
+    /// Sends a message of the vendor's own protocol (VoE); when, as for CoE.
+    SendVendorMessage {
+        /// What follows the mailbox header.
+        data: Vec<u8>,
+        /// How long an answer is waited for, which need not come.
+        answer_within: Span,
+    },
     /// Writes registers of the controller, before the new state is asked for.
     RegisterWrite {
         /// The first one.
@@ -61,6 +90,33 @@ pub enum StartUpAction {
         /// What is written.
         data: Vec<u8>,
     },
+}
+
+impl StartUpAction {
+    /// The command that gives a SubDevice its NetId, for AoE. The MainDevice that sends it is that of this computer.
+    #[must_use]
+    pub fn set_net_id(net_id: AmsNetId) -> Self {
+        let main_device = AmsNetId::of_main_device([127, 0, 0, 1]);
+        let address = |net_id| AmsAddress { net_id, port: AmsAddress::MAIN_DEVICE_PORT };
+        let (group, offset) = (index::OWN_NET_ID, index::OWN_NET_ID_OFFSET);
+        let (_, data) = AdsRequest::Write { group, offset, data: &net_id.0 }.to_bytes();
+        let (target, source) = (address(net_id), address(main_device));
+        Self::Ads { target, source, command: AdsCommand::Write, data }
+    }
+
+    /// The NetId that the command gives; `None` for any other command.
+    #[must_use]
+    pub fn net_id(&self) -> Option<AmsNetId> {
+        let Self::Ads { command, data, .. } = self else { return None };
+        match AdsRequest::parse(command.number(), data) {
+            Ok(AdsRequest::Write {
+                group: index::OWN_NET_ID,
+                offset: index::OWN_NET_ID_OFFSET,
+                data,
+            }) => data.try_into().ok().map(AmsNetId),
+            _ => None,
+        }
+    }
 }
 
 /// What is told of start-up commands that are not carried out: whose, how many, which (where they have
@@ -73,7 +129,7 @@ pub fn left_out(device: &str, protocol: &str, count: usize, names: &[String]) ->
     };
     let which = if names.is_empty() { String::new() } else { format!(" ({})", names.join(", ")) };
     format!(
-        "{device}: {what} by {protocol}{which} not carried out: that is not spoken at start-up, and the \
+        "{device}: {what} by {protocol}{which} not carried out: no message that can be sent at start-up, and the \
          SubDevice keeps the settings it has; make them with the maker's tool, or by CoE where it has objects \
          for them"
     )
@@ -157,6 +213,21 @@ impl fmt::Display for StartUpCommand {
             }
             StartUpAction::WriteIdn { drive, idn, data, .. } => {
                 write!(f, "{idn} of drive {drive} by SoE =")?;
+                (data, false)
+            }
+            StartUpAction::Ads { target, command, data, .. } => {
+                match self.action.net_id() {
+                    Some(net_id) => write!(f, "NetId {net_id} by AoE:")?,
+                    None => write!(f, "ADS {command} to {target} by AoE:")?,
+                }
+                (data, false)
+            }
+            StartUpAction::WriteFile { name, data, .. } => {
+                write!(f, "file `{name}` by FoE =")?;
+                (data, false)
+            }
+            StartUpAction::SendVendorMessage { data, .. } => {
+                f.write_str("message of the vendor by VoE:")?;
                 (data, false)
             }
             StartUpAction::RegisterWrite { address, data } => {

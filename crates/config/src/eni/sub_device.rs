@@ -1,6 +1,7 @@
 //! A SubDevice: element `Slave` (ETG.2100).
 
 use linesman_proto::address::{DeviceId, RegisterAddress, StationAddress, StationAlias};
+use linesman_proto::ads::AmsNetIdError;
 use linesman_proto::port::Port;
 use linesman_proto::register::{FmmuConfig, SmMode};
 use linesman_proto::sii::{Direction, Identity, MailboxArea, MailboxPair, Protocols};
@@ -192,7 +193,7 @@ fn mailbox(element: &Element, device: &mut DevicePlan) -> Result<Option<Mailbox>
     Ok(Some(Mailbox { areas, bootstrap, protocols: Protocols(protocols), complete_access }))
 }
 
-/// Commands by EoE and SoE; those that cannot be carried out are left out, and that is said.
+/// Commands by other protocols than CoE; those that cannot be carried out are left out, and that is said.
 fn settings(
     mailbox: &Element,
     device: &mut DevicePlan,
@@ -202,10 +203,15 @@ fn settings(
     let protocols: [(&str, Read); 5] = [
         ("EoE", setting::ethernet),
         ("SoE", setting::drive),
-        ("AoE", |_| Ok(None)),
-        ("FoE", |_| Ok(None)),
-        ("VoE", |_| Ok(None)),
+        ("AoE", setting::ads),
+        ("FoE", setting::file),
+        ("VoE", setting::vendor),
     ];
+    if let Some(net_id) = mailbox.at("AoE/NetId") {
+        let read = net_id.text().parse();
+        device.settings.net_id =
+            Some(read.map_err(|error: AmsNetIdError| net_id.error(error.to_string()))?);
+    }
     for (protocol, read) in protocols {
         let Some(commands) = mailbox.child(protocol).and_then(|one| one.child("InitCmds")) else {
             continue;

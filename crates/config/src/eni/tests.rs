@@ -1,6 +1,7 @@
 //! Files of the tools, made in miniature, and all that there are.
 
 use linesman_proto::address::{LogicalAddress, RegisterAddress, StationAddress, StationAlias};
+use linesman_proto::ads::AmsNetId;
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::frame::size::frame_size;
@@ -121,6 +122,9 @@ fn plans_agree_with_the_numbers_of_their_files() {
                 }
                 StartUpAction::SetAddresses { .. }
                 | StartUpAction::WriteIdn { .. }
+                | StartUpAction::Ads { .. }
+                | StartUpAction::WriteFile { .. }
+                | StartUpAction::SendVendorMessage { .. }
                 | StartUpAction::RegisterWrite { .. } => None,
             });
             objects.collect()
@@ -258,6 +262,7 @@ fn everything() -> Plan {
     });
     drive.settings.watchdog.process_data = Some(500);
     drive.settings.modules = vec![0x1234, 0, 7];
+    drive.settings.net_id = Some(AmsNetId([10, 0, 0, 1, 3, 1]));
     drive.settings.on_wrong_counter = OnWrongCounter::Clear;
     drive.start_up = vec![
         StartUpCommand {
@@ -286,6 +291,28 @@ fn everything() -> Plan {
                 data: vec![11, 0],
             },
             comment: "mode".to_owned(),
+        },
+        StartUpCommand {
+            transition: Transition::INIT_TO_PRE_OP,
+            action: StartUpAction::set_net_id(AmsNetId([10, 0, 0, 1, 3, 1])),
+            comment: "NetId".to_owned(),
+        },
+        StartUpCommand {
+            transition: Transition::PRE_OP_TO_SAFE_OP,
+            action: StartUpAction::WriteFile {
+                name: "cam.tbl".to_owned(),
+                password: 7,
+                data: vec![1, 2, 3],
+            },
+            comment: "table".to_owned(),
+        },
+        StartUpCommand {
+            transition: Transition::PRE_OP_TO_SAFE_OP,
+            action: StartUpAction::SendVendorMessage {
+                data: vec![2, 0, 0, 0, 1, 0, 7],
+                answer_within: Span::ms(100),
+            },
+            comment: "vendor".to_owned(),
         },
         StartUpCommand {
             transition: Transition::INIT_TO_PRE_OP,
@@ -425,6 +452,8 @@ fn what_is_left_out_of_a_file_is_said() {
  <EoE><InitCmds><InitCmd><Transition>IP</Transition><IP>10.0.0.2</IP></InitCmd>
   <InitCmd><Transition>IP</Transition><Disabled>1</Disabled></InitCmd></InitCmds></EoE>
  <SoE><InitCmds><InitCmd><Transition>PS</Transition></InitCmd><InitCmd><Transition>PS</Transition></InitCmd></InitCmds></SoE>
+ <AoE><NetId>10.0.0.1.3.1</NetId><InitCmds><InitCmd><Transition>IP</Transition><Data>0102</Data></InitCmd></InitCmds></AoE>
+ <FoE><InitCmds><InitCmd><Transition>PS</Transition><Comment>no name</Comment><Data>01</Data></InitCmd></InitCmds></FoE>
 </Mailbox>
 <HotConnect><GroupName>Tool 1</GroupName><GroupMemberCnt>1</GroupMemberCnt></HotConnect>
 </Slave></Config></EtherCATConfig>"#;
@@ -432,6 +461,10 @@ fn what_is_left_out_of_a_file_is_said() {
     let told = |words: &str| notes.iter().filter(|note| note.contains(words)).count();
     assert_eq!(told("Bridge: 1 start-up command by EoE not carried out"), 1, "{notes:?}");
     assert_eq!(told("Bridge: 2 start-up commands by SoE not carried out"), 1, "{notes:?}");
+    assert_eq!(told("Bridge: 1 start-up command by AoE not carried out"), 1, "{notes:?}");
+    assert_eq!(told("Bridge: 1 start-up command by FoE (no name) not carried out"), 1, "{notes:?}");
+    let wrong = Eni::parse(file.replace("10.0.0.1.3.1", "10.0.0.1").as_bytes()).unwrap_err();
+    assert!(wrong.to_string().contains("NetId"), "{wrong}");
     assert_eq!(told("hot connect group \"Tool 1\""), 1, "{notes:?}");
 }
 

@@ -20,7 +20,7 @@ pub struct EsiMailbox {
     pub soe_channels: u8,
     /// What a MainDevice is to write when it starts the device.
     pub commands: Vec<InitCommand>,
-    /// The same by EoE and SoE.
+    /// The same by other protocols.
     pub settings: Vec<StartUpCommand>,
     /// Commands that cannot be carried out: protocol, and how many.
     pub left_out: Vec<(&'static str, usize)>,
@@ -69,9 +69,9 @@ pub(super) fn mailbox(element: &Element) -> Result<EsiMailbox, EsiError> {
     for (protocol, read) in [
         ("EoE", setting::ethernet as fn(&Element) -> _),
         ("SoE", setting::drive),
-        ("AoE", |_: &Element| Ok(None)),
-        ("FoE", |_: &Element| Ok(None)),
-        ("VoE", |_: &Element| Ok(None)),
+        ("AoE", setting::ads),
+        ("FoE", setting::file),
+        ("VoE", setting::vendor),
     ] {
         let Some(commands) = element.child(protocol) else { continue };
         let mut left_out = 0;

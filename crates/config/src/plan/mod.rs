@@ -28,6 +28,7 @@ mod tables;
 use std::ops::Range;
 
 use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_proto::ads::AmsNetId;
 use linesman_proto::port::PortMap;
 use linesman_proto::register::{FmmuConfig, SyncManagerConfig};
 use linesman_proto::sii::{Identity, PortKind};
@@ -192,6 +193,13 @@ impl DevicePlan {
             ports: None,
             sync_times: SyncTimes::default(),
         }
+    }
+
+    /// Its NetId, for AoE: what a start-up command gives it, else what its configuration says; `None`: nobody says.
+    #[must_use]
+    pub fn net_id(&self) -> Option<AmsNetId> {
+        let given = self.start_up.iter().rev().find_map(|command| command.action.net_id());
+        given.or(self.settings.net_id)
     }
 }
 

@@ -4,6 +4,7 @@
 //! The defaults are what the MainDevice does when nothing is said.
 
 use linesman_proto::address::StationAlias;
+use linesman_proto::ads::AmsNetId;
 use linesman_proto::time::Span;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,8 @@ pub struct DeviceSettings {
     /// Modules that must sit in its slots, as object 0xF050 counts them from 1; 0 is an empty slot.
     /// No entries: not compared.
     pub modules: Vec<u32>,
+    /// Its NetId as a network configuration says it, beside the start-up command that gives it.
+    pub net_id: Option<AmsNetId>,
 }
 
 /// What the MainDevice does for a SubDevice by itself while the network runs (SW-15).

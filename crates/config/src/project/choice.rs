@@ -362,6 +362,10 @@ pub struct StartUpEntry {
     /// Addresses of an Ethernet port, instead of an object and data.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub eoe: Option<super::EthernetChoice>,
+    /// The NetId that a device which speaks AoE is to have, such as `192.168.1.5.3.1`, instead of an object and data.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(regex(pattern = "^[0-9]{1,3}([.][0-9]{1,3}){5}$")))]
+    pub net_id: Option<String>,
     /// What is written: bytes in the order on the wire, as hexadecimal digits, such as `"08 00"`.
     #[serde(default)]
     pub data: String,

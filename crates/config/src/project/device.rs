@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use linesman_proto::address::StationAddress;
+use linesman_proto::ads::AmsNetId;
 use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::port::Port;
 use linesman_proto::sii::Identity;
@@ -326,9 +327,11 @@ impl ProjectDevice {
                 command.register.is_some(),
                 command.idn.is_some(),
                 command.eoe.is_some(),
+                command.net_id.is_some(),
             ];
             if what.iter().filter(|there| **there).count() != 1 {
-                let reason = "start_up: expected one of `index`, `register`, `idn` and `eoe`";
+                let reason =
+                    "start_up: expected one of `index`, `register`, `idn`, `eoe` and `net_id`";
                 return wrong(reason.to_owned());
             }
             match &command.eoe {
@@ -341,6 +344,11 @@ impl ProjectDevice {
                     }
                     if let Err(reason) = choice.parameters() {
                         return wrong(format!("start_up: {reason}"));
+                    }
+                }
+                None if let Some(net_id) = &command.net_id => {
+                    if let Err(error) = net_id.parse::<AmsNetId>() {
+                        return wrong(format!("start_up: net_id `{net_id}`: {error}"));
                     }
                 }
                 None if command.data.trim().is_empty() => {

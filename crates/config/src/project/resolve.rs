@@ -206,6 +206,7 @@ impl Project {
                 forward_ethernet: device.eoe.unwrap_or(self.network.eoe),
             },
             modules,
+            net_id: None,
         };
         let [vendor, product, revision] = identity.unwrap_or_default();
         Ok(PlannedDevice {
@@ -234,6 +235,7 @@ fn command(entry: &super::StartUpEntry) -> Option<StartUpCommand> {
     let data = value::bytes(&entry.data).ok()?;
     let action = match (entry.index, entry.register) {
         (None, None) => match (&entry.eoe, &entry.idn) {
+            (None, None) => StartUpAction::set_net_id(entry.net_id.as_ref()?.parse().ok()?),
             (Some(choice), _) => StartUpAction::SetAddresses {
                 port: choice.port,
                 parameters: choice.parameters().ok()?,
@@ -242,7 +244,6 @@ fn command(entry: &super::StartUpEntry) -> Option<StartUpCommand> {
                 let idn = Idn::from_text(idn)?;
                 StartUpAction::WriteIdn { drive: entry.drive, idn, elements: VALUE, data }
             }
-            (None, None) => return None,
         },
         (Some(index), _) => StartUpAction::CoeDownload {
             object: ObjectAddress::new(index, entry.subindex),

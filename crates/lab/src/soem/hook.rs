@@ -27,8 +27,12 @@ pub(super) async fn run(bus: &Bus, device: &mut Device) {
             StartUpAction::RegisterWrite { address, data } => {
                 bus.write(device.target(), address.0, data, RETURN).await;
             }
-            // The examples of SOEM show neither.
-            StartUpAction::SetAddresses { .. } | StartUpAction::WriteIdn { .. } => {}
+            // The examples of SOEM show none of these.
+            StartUpAction::SetAddresses { .. }
+            | StartUpAction::WriteIdn { .. }
+            | StartUpAction::Ads { .. }
+            | StartUpAction::WriteFile { .. }
+            | StartUpAction::SendVendorMessage { .. } => {}
         }
     }
     device.hook.start_up = commands;

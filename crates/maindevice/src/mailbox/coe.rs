@@ -207,6 +207,7 @@ impl SdoTransfer<'_, '_> {
             Why::Aborted { .. }
             | Why::Ethernet { .. }
             | Why::Drive { .. }
+            | Why::Ads { .. }
             | Why::File { .. }
             | Why::Mailbox { .. }
             | Why::MailboxFull { .. }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use linesman_proto::address::DeviceId;
+use linesman_proto::ads::AdsCode;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::eoe::EoeResult;
 use linesman_proto::mailbox::error_reply::ErrorReplyCode;
@@ -80,6 +81,11 @@ pub enum Why {
         /// Its reason.
         code: SoeError,
     },
+    /// It refused a request of ADS.
+    Ads {
+        /// Its reason.
+        code: AdsCode,
+    },
     /// It answers with an error of the mailbox itself.
     Mailbox {
         /// Its reason.
@@ -147,6 +153,7 @@ impl Why {
             Self::Aborted { code } => code.explain().action,
             Self::File { code, .. } => code.action(),
             Self::Drive { code } => code.action(),
+            Self::Ads { code } => code.action(),
             Self::Ethernet { .. } => {
                 "check that the SubDevice takes addresses by EoE, and these ones; else set them with its \
                  maker's tool"
@@ -185,6 +192,7 @@ impl Why {
                 | Self::File { .. }
                 | Self::Ethernet { .. }
                 | Self::Drive { .. }
+                | Self::Ads { .. }
                 | Self::Mailbox { .. }
         )
     }
@@ -211,6 +219,7 @@ impl fmt::Display for Why {
             Self::File { code, text } => write!(f, "{code}; it says: {text}"),
             Self::Ethernet { result } => write!(f, "the SubDevice refuses the addresses, {result}"),
             Self::Drive { code } => write!(f, "the drive refuses, {code}"),
+            Self::Ads { code } => write!(f, "the SubDevice refuses, ADS code {code}"),
             Self::Mailbox { code } => write!(f, "the SubDevice refuses the message, {code}"),
             Self::NoAnswer { patience, rubbish } => {
                 write!(f, "no answer within {patience}, although its mailbox takes messages")?;

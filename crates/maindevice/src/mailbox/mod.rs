@@ -2,10 +2,11 @@
 //!
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
 //! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information`,
-//! `foe`, `settings` and `pass` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
+//! `foe`, `settings`, `aoe`, `voe` and `pass` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
 //! another; `ethernet` sends frames for the virtual switch. Emergencies and messages that nobody asked for become events; what went wrong is kept
 //! ([`ProtocolErrors`]).
 
+mod aoe;
 mod coe;
 mod ethernet;
 mod failure;
@@ -19,6 +20,7 @@ pub(crate) mod queue;
 mod request;
 mod settings;
 pub(crate) mod transaction;
+mod voe;
 
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::{Instant, Span};

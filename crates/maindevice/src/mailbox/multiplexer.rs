@@ -5,6 +5,7 @@
 
 use linesman_config::plan::DevicePlan;
 use linesman_proto::address::{DeviceId, RegisterAddress};
+use linesman_proto::ads::AmsNetId;
 use linesman_proto::mailbox::coe::Message as CoeMessage;
 use linesman_proto::mailbox::{self, Counter, Header, MailboxType, Message, eoe, soe};
 use linesman_proto::register::{SYNC_MANAGER, SmActivate, SmPdiControl, SmStatus};
@@ -91,6 +92,10 @@ pub(crate) struct Multiplexer {
     /// When a fragment of an Ethernet frame was sent or came.
     last_frame: Option<Instant>,
     fragments: UnansweredFragments,
+    /// Its NetId, for AoE.
+    net_id: AmsNetId,
+    /// Number of the last ADS request.
+    invoke_id: u32,
 }
 
 impl Multiplexer {
@@ -115,6 +120,8 @@ impl Multiplexer {
             repetitions: 0,
             last_frame: None,
             fragments: UnansweredFragments::default(),
+            net_id: device.net_id().unwrap_or(AmsNetId::of_sub_device(device.station)),
+            invoke_id: 0,
         })
     }
 
@@ -152,6 +159,17 @@ impl Multiplexer {
     /// A fragment of an Ethernet frame was sent.
     pub(crate) fn fragment_sent(&mut self) {
         self.fragments.sent(self.wire.now());
+    }
+
+    /// Its NetId: that of the plan, else one made of its station address.
+    pub(crate) fn net_id(&self) -> AmsNetId {
+        self.net_id
+    }
+
+    /// The number of the next ADS request. It is not begun anew with the SubDevice, so that no late answer has it.
+    pub(crate) fn next_invoke_id(&mut self) -> u32 {
+        self.invoke_id = self.invoke_id.wrapping_add(1);
+        self.invoke_id
     }
 
     pub(crate) fn now(&self) -> Instant {

@@ -70,7 +70,8 @@ pub(crate) async fn pass(
     }
 }
 
-fn copy(data: &[u8], body: &mut [u8]) -> Result<usize, BufferTooSmall> {
+/// Writes a body that is ready.
+pub(super) fn copy(data: &[u8], body: &mut [u8]) -> Result<usize, BufferTooSmall> {
     let (needed, available) = (data.len(), body.len());
     let slot = body.get_mut(..needed).ok_or(BufferTooSmall { needed, available })?;
     slot.copy_from_slice(data);

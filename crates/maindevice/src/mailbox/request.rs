@@ -2,10 +2,12 @@
 
 use std::fmt;
 
+use linesman_proto::ads::{AdsCommand, AdsRequest, AmsAddress, AmsNetId};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use linesman_proto::mailbox::soe::Idn;
+use linesman_proto::time::Span;
 
 /// Something to be asked. What each of them gives is said there, as bytes.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -100,6 +102,27 @@ pub enum MailboxRequest {
         /// The bytes.
         data: Vec<u8>,
     },
+    /// Ask by ADS (AoE): what the answer has behind its result; of reading the bytes alone.
+    Ads {
+        /// Its NetId; `None`: that of the plan ([`DevicePlan::net_id`](linesman_config::plan::DevicePlan::net_id)), or
+        /// one made of its station address.
+        net_id: Option<AmsNetId>,
+        /// The AMS port.
+        port: u16,
+        /// Who asks; `None`: the MainDevice.
+        source: Option<AmsAddress>,
+        /// What is asked.
+        command: AdsCommand,
+        /// What follows the AMS header, as [`AdsRequest::to_bytes`] gives it.
+        data: Vec<u8>,
+    },
+    /// Send a message of the vendor's own protocol (VoE): what answers it; nothing where it is not answered.
+    SendVendorMessage {
+        /// What follows the mailbox header: vendor id, the vendor's number, data.
+        data: Vec<u8>,
+        /// How long an answer is waited for.
+        answer_within: Span,
+    },
     /// Pass on a message of a client of the mailbox gateway: the mailbox messages that answer it, each with its
     /// header, one behind the other; none for a message that is not answered.
     Pass {
@@ -128,7 +151,9 @@ impl MailboxRequest {
             | Self::ReadIdn { .. }
             | Self::WriteIdn { .. }
             | Self::ReadFile { .. }
-            | Self::WriteFile { .. } => None,
+            | Self::WriteFile { .. }
+            | Self::Ads { .. }
+            | Self::SendVendorMessage { .. } => None,
         }
     }
 
@@ -163,6 +188,22 @@ impl MailboxRequest {
             }
             Self::ReadFile { name, .. } => MailboxOperation::ReadFile { name: name.clone() },
             Self::WriteFile { name, .. } => MailboxOperation::WriteFile { name: name.clone() },
+            Self::Ads { port, command, data, .. } => MailboxOperation::Ads {
+                port: *port,
+                command: *command,
+                place: match AdsRequest::parse(command.number(), data) {
+                    Ok(
+                        AdsRequest::Read { group, offset, .. }
+                        | AdsRequest::Write { group, offset, .. }
+                        | AdsRequest::ReadWrite { group, offset, .. },
+                    ) => Some((group, offset)),
+                    Ok(AdsRequest::DeviceInfo | AdsRequest::State | AdsRequest::Other(_))
+                    | Err(_) => None,
+                },
+            },
+            Self::SendVendorMessage { data, .. } => {
+                MailboxOperation::SendVendorMessage { len: data.len() }
+            }
             Self::Pass { kind, .. } => MailboxOperation::Pass { protocol: *kind },
         }
     }
@@ -234,6 +275,20 @@ pub enum MailboxOperation {
         /// Which.
         name: String,
     },
+    /// Asking by ADS.
+    Ads {
+        /// The AMS port.
+        port: u16,
+        /// What is asked.
+        command: AdsCommand,
+        /// Index group and offset, where the command has them.
+        place: Option<(u32, u32)>,
+    },
+    /// Sending a message of the vendor's own protocol.
+    SendVendorMessage {
+        /// How many bytes it has.
+        len: usize,
+    },
     /// Passing on a message of a client of the mailbox gateway.
     Pass {
         /// Its protocol.
@@ -254,6 +309,8 @@ impl MailboxOperation {
             Self::SetAddresses { .. } | Self::SendFrame { .. } => MailboxType::Eoe,
             Self::ReadIdn { .. } | Self::WriteIdn { .. } => MailboxType::Soe,
             Self::ReadFile { .. } | Self::WriteFile { .. } => MailboxType::Foe,
+            Self::Ads { .. } => MailboxType::Aoe,
+            Self::SendVendorMessage { .. } => MailboxType::Voe,
             Self::Pass { protocol } => *protocol,
         }
     }
@@ -280,6 +337,16 @@ impl fmt::Display for MailboxOperation {
             Self::WriteIdn { drive, idn } => write!(f, "writing {idn} of drive {drive}"),
             Self::ReadFile { name } => write!(f, "reading file `{name}`"),
             Self::WriteFile { name } => write!(f, "writing file `{name}`"),
+            Self::Ads { port, command, place } => {
+                write!(f, "asking AMS port {port} by ADS ({command}")?;
+                if let Some((group, offset)) = place {
+                    write!(f, ", index group 0x{group:X}, offset 0x{offset:X}")?;
+                }
+                f.write_str(")")
+            }
+            Self::SendVendorMessage { len } => {
+                write!(f, "sending a vendor's message of {len} bytes (VoE)")
+            }
             Self::Pass { protocol } => {
                 write!(f, "passing on a message of {protocol} for a client of the mailbox gateway")
             }

@@ -27,6 +27,7 @@ use crate::executor::Executor;
 use crate::options::Options;
 use crate::supervisor::DeviceTable;
 
+mod ads;
 mod drive_numbers;
 mod fragments;
 
@@ -52,9 +53,9 @@ enum Said {
     Several(Vec<(u8, Vec<u8>)>),
 }
 
-/// A mailbox of 32 bytes each way: 16 bytes of SDO data in a first message, 23 in a segment.
-fn device() -> DevicePlan {
-    let areas = MailboxPair::from_words([OUT, 32, IN, 32]);
+/// A mailbox of so many bytes each way. Of 32: 16 bytes of SDO data in a first message, 23 in a segment.
+fn device(size: u16) -> DevicePlan {
+    let areas = MailboxPair::from_words([OUT, size, IN, size]);
     let protocols = Protocols(Protocols::COE | Protocols::EOE | Protocols::FOE | Protocols::SOE);
     DevicePlan {
         name: "5".to_owned(),
@@ -80,6 +81,8 @@ struct Scripted {
     /// What follows it.
     behind: VecDeque<(u8, Vec<u8>)>,
     counter: u8,
+    /// Bytes of its mailbox, each way.
+    size: u16,
 }
 
 impl Scripted {
@@ -103,6 +106,7 @@ impl Scripted {
             waiting: None,
             behind: VecDeque::new(),
             counter: 0,
+            size: 32,
         }
     }
 
@@ -116,7 +120,11 @@ impl Scripted {
             (Command::Fpwr, OUT) if self.deaf => (0, request.data.to_vec()),
             (Command::Fprd, IN_STATUS) => (1, vec![if self.waiting.is_some() { FULL } else { 0 }]),
             (Command::Fpwr, OUT) => {
-                assert_eq!(request.data.len(), 32, "the whole mailbox is written");
+                assert_eq!(
+                    request.data.len(),
+                    usize::from(self.size),
+                    "the whole mailbox is written"
+                );
                 let len = usize::from(request.data[0]);
                 self.heard.push(request.data[6..6 + len].to_vec());
                 if !self.says.is_empty() {
@@ -131,7 +139,7 @@ impl Scripted {
                     }
                     (1, message)
                 }
-                None => (0, vec![0; 32]),
+                None => (0, vec![0; self.size.into()]),
             },
             other => panic!("{other:?}"),
         };
@@ -157,7 +165,7 @@ impl Scripted {
         }
         let mut message = vec![body.len() as u8, 0, 0, 0, 0, kind | self.counter << 4];
         message.extend(body);
-        message.resize(32, 0);
+        message.resize(self.size.into(), 0);
         self.waiting = Some(message);
     }
 }
@@ -173,8 +181,8 @@ fn run_all(scripted: &mut Scripted, requests: Vec<MailboxRequest>) -> (Vec<Outco
     let mut executor = Executor::new();
     let wire = executor.group(0);
     let tree = linesman_proto::topology::derive(&[]).unwrap();
-    let mut devices: Vec<DevicePlan> = (0..4).map(|_| device()).collect();
-    devices.push(device());
+    let mut devices: Vec<DevicePlan> = (0..4).map(|_| device(scripted.size)).collect();
+    devices.push(device(scripted.size));
     let plan = Plan { devices, ..Plan::empty(tree) };
     let mut device_table = DeviceTable::new(&plan);
     device_table.set_reached(ID, AlState::PreOp);

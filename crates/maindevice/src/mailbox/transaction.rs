@@ -1,16 +1,23 @@
 //! One transaction through a mailbox: requests and answers, until it is done.
 
+use linesman_proto::ads::{AmsAddress, AmsNetId};
 use linesman_proto::mailbox::{BufferTooSmall, MailboxType};
 use linesman_proto::time::{Instant, Span};
 
 use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
 use super::request::MailboxRequest;
-use super::{coe, ethernet, foe, information, pass, settings};
+use super::{aoe, coe, ethernet, foe, information, pass, settings, voe};
 
 /// A SubDevice that writes what it got into its flash memory answers late: a file takes more patience
 /// than an object.
 const FILE_PATIENCE: Span = Span::s(10);
+
+/// Sender of ADS requests where a request names none: the MainDevice of this computer.
+const OWN_ADDRESS: AmsAddress = AmsAddress {
+    net_id: AmsNetId::of_main_device([127, 0, 0, 1]),
+    port: AmsAddress::MAIN_DEVICE_PORT,
+};
 
 /// An operation under way.
 pub(crate) struct MailboxTransaction<'a> {
@@ -88,6 +95,14 @@ impl MailboxTransaction<'_> {
             MailboxRequest::WriteFile { name, password, data } => {
                 foe::write(self, name, *password, data).await.map(|()| Vec::new())
             }
+            MailboxRequest::Ads { net_id, port, source, command, data } => {
+                let net_id = net_id.unwrap_or(self.multiplexer.net_id());
+                let target = AmsAddress { net_id, port: *port };
+                aoe::ask(self, target, source.unwrap_or(OWN_ADDRESS), *command, data).await
+            }
+            MailboxRequest::SendVendorMessage { data, answer_within } => {
+                voe::send(self, data, *answer_within).await
+            }
             MailboxRequest::Pass { kind, data, .. } => pass::pass(self, *kind, data).await,
         }
     }
@@ -121,6 +136,11 @@ impl MailboxTransaction<'_> {
     /// Something came, and more is to come: it is waited for as long again.
     pub(crate) fn wait_anew(&mut self) {
         self.until = self.multiplexer.now() + self.patience;
+    }
+
+    /// An answer may or may not come: it is waited for so long.
+    pub(crate) fn wait_no_longer_than(&mut self, span: Span) {
+        self.until = self.multiplexer.now() + span;
     }
 
     /// Says something without caring for the answer, and whether it is heard.

@@ -91,6 +91,8 @@ pub enum RefusalKind {
     EoeResult,
     /// The error code of a drive, of SoE.
     SoeError,
+    /// A return code of ADS, of AoE.
+    AdsError,
     /// The code of a mailbox error reply.
     MailboxError,
     /// An AL status code.
@@ -99,11 +101,12 @@ pub enum RefusalKind {
 
 impl RefusalKind {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::SdoAbort,
         Self::FoeError,
         Self::EoeResult,
         Self::SoeError,
+        Self::AdsError,
         Self::MailboxError,
         Self::AlStatus,
     ];
@@ -116,6 +119,7 @@ impl RefusalKind {
             Self::FoeError => "foe-error",
             Self::EoeResult => "eoe-result",
             Self::SoeError => "soe-error",
+            Self::AdsError => "ads-error",
             Self::MailboxError => "mailbox-error",
             Self::AlStatus => "al-status",
         }
@@ -133,6 +137,7 @@ impl ServiceFailure {
                 Why::File { code, .. } => Some((RefusalKind::FoeError, code.0)),
                 Why::Ethernet { result } => Some((RefusalKind::EoeResult, result.0.into())),
                 Why::Drive { code } => Some((RefusalKind::SoeError, code.0.into())),
+                Why::Ads { code } => Some((RefusalKind::AdsError, code.0)),
                 Why::Mailbox { code } => Some((RefusalKind::MailboxError, code.code().into())),
                 _ => None,
             },

@@ -54,6 +54,9 @@ pub(super) async fn execute(
             StartUpAction::CoeDownload { .. }
             | StartUpAction::SetAddresses { .. }
             | StartUpAction::WriteIdn { .. }
+            | StartUpAction::Ads { .. }
+            | StartUpAction::WriteFile { .. }
+            | StartUpAction::SendVendorMessage { .. }
                 if due(transition) != moment =>
             {
                 continue;
@@ -74,6 +77,25 @@ pub(super) async fn execute(
                 let (drive, idn, elements) = (*drive, *idn, *elements);
                 let data = data.clone();
                 let request = MailboxRequest::WriteIdn { drive, idn, elements, data };
+                asked(context, device, request).await
+            }
+            StartUpAction::Ads { target, source, command, data } => {
+                let request = MailboxRequest::Ads {
+                    net_id: Some(target.net_id),
+                    port: target.port,
+                    source: Some(*source),
+                    command: *command,
+                    data: data.clone(),
+                };
+                asked(context, device, request).await
+            }
+            StartUpAction::WriteFile { name, password, data } => {
+                let (name, password, data) = (name.clone(), *password, data.clone());
+                asked(context, device, MailboxRequest::WriteFile { name, password, data }).await
+            }
+            StartUpAction::SendVendorMessage { data, answer_within } => {
+                let (data, answer_within) = (data.clone(), *answer_within);
+                let request = MailboxRequest::SendVendorMessage { data, answer_within };
                 asked(context, device, request).await
             }
             StartUpAction::RegisterWrite { .. } if moment == Moment::After => continue,

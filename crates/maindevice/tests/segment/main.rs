@@ -4,6 +4,7 @@
 
 mod addressing;
 mod al_errors;
+mod aoe;
 mod bench;
 mod clocks;
 mod delays;

@@ -139,6 +139,7 @@ fn device(plan: &Plan, planned: &DevicePlan, watched: &WatchedDevice) -> OnlineD
         abnormal_changes: watched.abnormal_changes(),
         presence_changes: watched.presence_changes(),
         history: history.collect(),
+        net_id: planned.net_id().map(|net_id| net_id.to_string()),
         ..OnlineDevice::default()
     }
 }

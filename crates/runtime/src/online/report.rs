@@ -178,6 +178,9 @@ pub struct OnlineDevice {
     pub history: Vec<OnlineChange>,
     /// Its mailbox; `null`: it has none, or nobody drives the line.
     pub mailbox: Option<OnlineMailbox>,
+    /// Its NetId, by which ADS reaches it (AoE); `null`: its configuration names none.
+    #[serde(default)]
+    pub net_id: Option<String>,
 }
 
 /// Who a SubDevice is.

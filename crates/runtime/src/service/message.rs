@@ -3,6 +3,7 @@
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer};
 use linesman_proto::address::RegisterAddress;
+use linesman_proto::ads::{AdsCommand, AmsAddress, AmsNetId};
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::information::{ListKind, ValueInfo};
 use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
@@ -10,6 +11,7 @@ use linesman_proto::mailbox::soe::Idn;
 use linesman_proto::register::AlStatus;
 use linesman_proto::sii::WordAddress;
 use linesman_proto::state::{AlState, AlStatusCode};
+use linesman_proto::time::Span;
 use serde::{Deserialize, Serialize};
 
 use crate::online::report::OnlineReport;
@@ -99,6 +101,19 @@ pub enum Asked {
         password: u32,
         data: String,
     },
+    /// Ask by ADS (AoE), by the number of the command. Without a NetId it is that of the plan, without a sender (NetId
+    /// and port) the MainDevice.
+    Ads {
+        #[serde(default)]
+        net_id: Option<String>,
+        port: u16,
+        #[serde(default)]
+        source: Option<(String, u16)>,
+        command: u16,
+        data: String,
+    },
+    /// Send a message of the vendor's own protocol (VoE).
+    SendVendorMessage { data: String, answer_within_ms: u32 },
     /// Pass on a message of a client of the mailbox gateway, by the number of its protocol.
     Pass { client: u64, protocol: u8, data: String },
     /// Look at its state.
@@ -152,7 +167,8 @@ pub struct Answer {
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RefusalCode {
-    /// Whose code it is: `sdo-abort`, `foe-error`, `mailbox-error` or `al-status`.
+    /// Whose code it is: `sdo-abort`, `foe-error`, `eoe-result`, `soe-error`, `ads-error`, `mailbox-error` or
+    /// `al-status`.
     pub kind: String,
     /// The code.
     pub code: u32,
@@ -290,6 +306,18 @@ impl From<&MailboxRequest> for Asked {
                 let (name, data) = (name.clone(), to_hex(data));
                 Self::WriteFile { name, password: *password, data }
             }
+            MailboxRequest::Ads { net_id, port, source, command, data } => Self::Ads {
+                net_id: net_id.map(|net_id| net_id.to_string()),
+                port: *port,
+                source: source.map(|source| (source.net_id.to_string(), source.port)),
+                command: command.number(),
+                data: to_hex(data),
+            },
+            MailboxRequest::SendVendorMessage { data, answer_within } => {
+                let ms = answer_within.as_nanos() / 1_000_000;
+                let answer_within_ms = u32::try_from(ms).unwrap_or(u32::MAX);
+                Self::SendVendorMessage { data: to_hex(data), answer_within_ms }
+            }
             MailboxRequest::Pass { client, kind, data } => {
                 Self::Pass { client: *client, protocol: kind.code(), data: to_hex(data) }
             }
@@ -347,6 +375,21 @@ impl Asked {
                 let data = from_hex(&data)?;
                 Service::Mailbox(MailboxRequest::WriteFile { name, password, data })
             }
+            Self::Ads { net_id, port, source, command, data } => {
+                let net_id = net_id.as_deref().map(known_net_id).transpose()?;
+                let source = source.map(|(net_id, port)| {
+                    known_net_id(&net_id).map(|net_id| AmsAddress { net_id, port })
+                });
+                let command = AdsCommand::from_number(command)
+                    .ok_or_else(|| format!("ADS command {command}: expected 1 to 9"))?;
+                let (source, data) = (source.transpose()?, from_hex(&data)?);
+                Service::Mailbox(MailboxRequest::Ads { net_id, port, source, command, data })
+            }
+            Self::SendVendorMessage { data, answer_within_ms } => {
+                let answer_within = Span::ms(u64::from(answer_within_ms));
+                let data = from_hex(&data)?;
+                Service::Mailbox(MailboxRequest::SendVendorMessage { data, answer_within })
+            }
             Self::Pass { client, protocol, data } => {
                 let (kind, data) = (MailboxType::from_code(protocol), from_hex(&data)?);
                 Service::Mailbox(MailboxRequest::Pass { client, kind, data })
@@ -367,6 +410,10 @@ impl Asked {
             }
         })
     }
+}
+
+fn known_net_id(text: &str) -> Result<AmsNetId, String> {
+    text.parse().map_err(|error| format!("`{text}`: {error}"))
 }
 
 fn known(state: u8) -> Result<AlState, String> {
@@ -409,6 +456,17 @@ mod tests {
             Service::Mailbox(MailboxRequest::DescribeEntry { object, values: ValueInfo(0x10) }),
             Service::Mailbox(MailboxRequest::ReadFile { name: name.clone(), password }),
             Service::Mailbox(MailboxRequest::WriteFile { name, password, data: data.clone() }),
+            Service::Mailbox(MailboxRequest::Ads {
+                net_id: Some(AmsNetId([10, 0, 0, 1, 3, 1])),
+                port: 0x1000,
+                source: Some(AmsAddress { net_id: AmsNetId([10, 0, 0, 1, 2, 1]), port: 7 }),
+                command: AdsCommand::ReadWrite,
+                data: data.clone(),
+            }),
+            Service::Mailbox(MailboxRequest::SendVendorMessage {
+                data: data.clone(),
+                answer_within: Span::ms(30),
+            }),
             Service::Mailbox(MailboxRequest::Pass {
                 client: 3,
                 kind: MailboxType::Voe,

@@ -55,6 +55,7 @@ pub(super) fn add(
         idn: None,
         drive: 0,
         eoe: None,
+        net_id: None,
         data: command.data.iter().map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" "),
         comment: command.comment.to_owned(),
     };

@@ -1,6 +1,7 @@
 //! Elements `Slave`.
 
 use linesman_proto::address::RegisterAddress;
+use linesman_proto::ads::AmsHeader;
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::register::{
     FMMU, FmmuConfig, SYNC_MANAGER, SmControl, SmDirection, SyncManagerConfig,
@@ -145,25 +146,38 @@ fn write_mailbox(xml: &mut Xml, device: &DevicePlan, mailbox: &Mailbox) {
     });
 }
 
-/// Start-up commands by EoE and SoE.
+/// Start-up commands by other protocols than CoE.
 fn settings(xml: &mut Xml, device: &DevicePlan) {
     type Is = fn(&StartUpAction) -> bool;
-    let kinds: [(&str, Is); 2] = [
+    let kinds: [(&str, Is); 5] = [
         ("EoE", |action| matches!(action, StartUpAction::SetAddresses { .. })),
         ("SoE", |action| matches!(action, StartUpAction::WriteIdn { .. })),
+        ("AoE", |action| matches!(action, StartUpAction::Ads { .. })),
+        ("FoE", |action| matches!(action, StartUpAction::WriteFile { .. })),
+        ("VoE", |action| matches!(action, StartUpAction::SendVendorMessage { .. })),
     ];
     for (protocol, is_one) in kinds {
         let mut commands = device.start_up.iter().filter(|one| is_one(&one.action)).peekable();
-        if commands.peek().is_none() {
+        let net_id = device.net_id().filter(|_| protocol == "AoE");
+        if commands.peek().is_none() && net_id.is_none() {
             continue;
         }
         xml.element(protocol, &[], |xml| {
+            if let Some(net_id) = net_id {
+                xml.text("NetId", net_id);
+            }
             xml.element("InitCmds", &[], |xml| {
                 for command in commands {
                     xml.element("InitCmd", &[], |xml| {
                         xml.text("Transition", command.transition.letters());
                         xml.text("Comment", &command.comment);
-                        xml.text("Timeout", 0);
+                        let timeout = match &command.action {
+                            StartUpAction::SendVendorMessage { answer_within, .. } => {
+                                answer_within.as_nanos() / 1_000_000
+                            }
+                            _ => 0,
+                        };
+                        xml.text("Timeout", timeout);
                         match &command.action {
                             StartUpAction::SetAddresses { parameters, .. } => {
                                 xml.text("Type", 2);
@@ -175,6 +189,20 @@ fn settings(xml: &mut Xml, device: &DevicePlan) {
                                 xml.text("IDN", idn.0);
                                 xml.text("Elements", elements);
                                 xml.text("Attribute", 0);
+                                xml.text("Data", hex(data));
+                            }
+                            StartUpAction::Ads { target, source, command, data } => {
+                                let number = command.number();
+                                let header = AmsHeader::request(*target, *source, number, 0);
+                                xml.text("Data", hex(&header.message(data)));
+                            }
+                            StartUpAction::WriteFile { name, password, data } => {
+                                xml.text("OpCode", 2);
+                                xml.text("Name", name);
+                                xml.text("Password", password);
+                                xml.text("Data", hex(data));
+                            }
+                            StartUpAction::SendVendorMessage { data, .. } => {
                                 xml.text("Data", hex(data));
                             }
                             StartUpAction::CoeDownload { .. }
