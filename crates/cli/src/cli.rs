@@ -3,8 +3,9 @@
 use clap::{Parser, Subcommand};
 
 use crate::command::{
-    bundle, capture, completion, counters, demo, diagnose, explain, fault, foe, history, host, id,
-    interfaces, lab, log, online, plan, probe, reg, ring, run, scan, schema, sdo, sii, sim, state,
+    aoe, bundle, capture, completion, counters, demo, diagnose, explain, fault, foe, history, host,
+    id, interfaces, lab, log, online, plan, probe, reg, ring, run, scan, schema, sdo, sii, sim,
+    state,
 };
 use crate::version::VERSION;
 
@@ -71,6 +72,8 @@ pub(crate) enum Command {
     History(history::Arguments),
     /// Files of a SubDevice: fetch, bring, update firmware
     Foe(foe::Arguments),
+    /// A SubDevice asked by ADS through its mailbox: name, state, index groups, NetId
+    Aoe(aoe::Arguments),
     /// EEPROM of a SubDevice: read, write, compare, station alias
     Sii(sii::Arguments),
     /// Numbers that tell equal SubDevices apart: read, compared with a project, set
@@ -121,6 +124,7 @@ impl Command {
             Self::Sdo(arguments) => Some(&arguments.place.line),
             Self::History(arguments) => Some(&arguments.place.line),
             Self::Foe(arguments) => Some(&arguments.place.line),
+            Self::Aoe(arguments) => Some(&arguments.place.line),
             Self::Sii(arguments) => Some(&arguments.place.line),
             Self::Reg(arguments) => Some(&arguments.place.line),
             Self::Id(arguments) => Some(&arguments.line),
@@ -161,6 +165,7 @@ impl Command {
             Self::Sdo(arguments) => arguments.json,
             Self::History(arguments) => arguments.json,
             Self::Foe(arguments) => arguments.json,
+            Self::Aoe(arguments) => arguments.json,
             Self::Sii(arguments) => arguments.json,
             Self::Reg(arguments) => arguments.json,
             Self::Counters(arguments) => arguments.json,

@@ -1,5 +1,6 @@
 //! The commands, one file each.
 
+pub(crate) mod aoe;
 pub(crate) mod bundle;
 pub(crate) mod capture;
 pub(crate) mod completion;
@@ -58,6 +59,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::Sdo(arguments) => sdo::run(&arguments, output),
         Command::History(arguments) => history::run(&arguments, output),
         Command::Foe(arguments) => foe::run(&arguments, output),
+        Command::Aoe(arguments) => aoe::run(&arguments, output),
         Command::Sii(arguments) => sii::run(&arguments, output),
         Command::Counters(arguments) => counters::run(&arguments, output),
         Command::Probe(arguments) => probe::run(&arguments, output),

@@ -26,7 +26,7 @@ use super::run::several::RunReports;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
 use super::{
-    capture, counters, explain, foe, history, host, id, probe, reg, ring, service, sii, state,
+    aoe, capture, counters, explain, foe, history, host, id, probe, reg, ring, service, sii, state,
 };
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -119,6 +119,8 @@ pub(crate) enum Name {
     History,
     /// `foe --json`
     File,
+    /// `aoe --json`
+    Ads,
     /// `sii --json`
     Sii,
     /// `counters --json`
@@ -179,6 +181,7 @@ fn schema(name: Name) -> Schema {
         Name::Objects => schema_for!(ListReport),
         Name::History => schema_for!(history::Report),
         Name::File => schema_for!(foe::Report),
+        Name::Ads => schema_for!(aoe::Report),
         Name::Sii => schema_for!(sii::Report),
         Name::Counters => schema_for!(counters::Report),
         Name::Probe => schema_for!(probe::Report),

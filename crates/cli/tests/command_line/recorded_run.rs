@@ -300,3 +300,46 @@ fn recorded_run_of_46_subdevices_is_surveyed_from_its_frames() {
     let reached = states.iter().any(|one| one["what"] == "read" && one["state"] == "OP");
     assert!(reached, "{states:?}");
 }
+
+/// A bridge that speaks AoE, which is given a NetId at start-up.
+const BRIDGE: &str = "\
+[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+[[device]]\nname = \"B1\"\ntype = \"EL6692\"\non = \"K1.B\"\n\
+[[device.start_up]]\ntransition = \"IP\"\nnet_id = \"10.0.0.7.3.1\"\n";
+
+#[test]
+fn recorded_request_of_ads_and_its_answer_are_dissected_alike() {
+    let folder = TempDir::new().unwrap();
+    let capture = record(folder.path(), BRIDGE);
+    let fields = [
+        "ams.targetnetid",
+        "ams.targetport",
+        "ams.sendernetid",
+        "ams.senderport",
+        "ams.cmdid",
+        "ams.stateflags",
+        "ams.cbdata",
+        "ams.errorcode",
+        "ams.invokeid",
+        "ams.ads_indexgroup",
+        "ams.ads_indexoffset",
+        "ams.adsresult",
+    ];
+    let mut tshark = Program::new("tshark");
+    tshark.arg("-r").arg(&capture).args(["-Y", "ams", "-T", "fields", "-E", "separator=|"]);
+    for field in fields {
+        tshark.args(["-e", field]);
+    }
+    let Ok(output) = tshark.output() else {
+        eprintln!("SKIPPED: tshark is not here to judge the recorded messages");
+        return;
+    };
+    let text = String::from_utf8(output.stdout).unwrap();
+    let mut rows: Vec<&str> = text.lines().collect();
+    // A message is seen where it goes out, and where the frame comes back with it.
+    rows.dedup();
+    let request = "10.0.0.7.3.1|65535|127.0.0.1.2.1|65535|3|0x0004|18|0x00000000|0x00000001|0x00000001|0x00000003|";
+    let answer =
+        "127.0.0.1.2.1|65535|10.0.0.7.3.1|65535|3|0x0005|4|0x00000000|0x00000001|||0x00000000";
+    assert_eq!(rows, [request, answer], "{text}");
+}

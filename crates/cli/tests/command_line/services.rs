@@ -256,6 +256,28 @@ fn files_go_to_and_from_a_subdevice_and_errors_say_why() {
     assert_eq!(again.status, 2, "no local file is overwritten: {}", again.all());
 }
 
+#[test]
+fn subdevice_is_asked_by_ads_and_given_a_net_id() {
+    let plant = Plant::with(&PLANT.replace("EL6601", "EL6692"));
+    let info = plant.json("aoe", &["C1", "info"], "ads", 0);
+    assert_eq!(info["info"]["name"], "EL6692", "{info}");
+    assert_eq!(plant.json("aoe", &["C1", "state"], "ads", 0)["state"], serde_json::json!([5, 2]));
+    let read = plant.run("aoe", &["C1", "read", "0xF302", "0x10180001"]);
+    assert!(read.stdout.contains("C1 (EL6692): 02 00 00 00"), "{}", read.all());
+    let both = ["C1", "read-write", "0xF302", "0x10F10002", "05 00", "2"];
+    assert_eq!(plant.json("aoe", &both, "ads", 0)["data"], "0500");
+    let written = plant.run("aoe", &["C1", "set-net-id", "10.0.0.1.3.1"]);
+    assert!(written.stdout.contains("C1 (EL6692): written"), "{}", written.all());
+    let refused = plant.json("aoe", &["C1", "read", "0xF302", "0x55550000"], "refusal", 1);
+    assert_eq!((&refused["kind"], &refused["code"]), (&"ads-error".into(), &0x70C.into()));
+    let reason = refused["reason"].as_str().unwrap();
+    assert!(reason.contains("C1 (EL6692)") && reason.contains("0x70C not found"), "{reason}");
+    // What speaks no ADS, and what is no row of bytes.
+    assert_eq!(plant.json("aoe", &["A1", "info"], "refusal", 1)["kind"], "mailbox-error");
+    let wrong = plant.run("aoe", &["C1", "write", "0xF302", "0x10F10002", "5"]);
+    assert_eq!(wrong.status, 2, "{}", wrong.all());
+}
+
 // proves: SW-08 partial: one message, not the five of the source
 #[test]
 fn a_history_is_read_with_texts_exported_and_acknowledged() {

@@ -20,12 +20,12 @@ const READ_HEADER_LEN: usize = 8;
 
 /// The server.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
-pub(super) struct AdsServer {
+pub(super) struct AoeServer {
     /// The NetId that the MainDevice has written.
     net_id: Option<AmsNetId>,
 }
 
-impl AdsServer {
+impl AoeServer {
     /// Answers a message. `room` is the length of the mailbox that the answer goes into.
     pub(super) fn answer(
         &mut self,

@@ -24,7 +24,7 @@ use linesman_proto::sii::Protocols;
 use linesman_proto::state::AlState;
 use linesman_proto::time::{Instant, Span};
 
-use self::aoe::AdsServer;
+use self::aoe::AoeServer;
 use self::coe::CoeServer;
 use self::eoe::EoePort;
 pub use self::eoe::FragmentsLeftOut;
@@ -67,7 +67,7 @@ pub struct Served<'a> {
 #[derive(Debug)]
 pub struct Mailbox {
     protocols: Protocols,
-    aoe: AdsServer,
+    aoe: AoeServer,
     coe: CoeServer,
     eoe: EoePort,
     foe: FoeServer,
@@ -86,7 +86,7 @@ impl Mailbox {
     pub fn new(response_time: Span, protocols: Protocols) -> Self {
         Self {
             protocols,
-            aoe: AdsServer::default(),
+            aoe: AoeServer::default(),
             coe: CoeServer::default(),
             eoe: EoePort::default(),
             foe: FoeServer::default(),
