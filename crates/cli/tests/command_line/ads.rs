@@ -256,6 +256,58 @@ fn read_only_server_changes_nothing() {
     assert_eq!(running.status()["ads"]["read_only"], true);
 }
 
+/// The drive's place is taken by a bridge that speaks AoE, whose project gives it a NetId.
+const BRIDGE: &str = "\
+[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+[[device]]\nname = \"B1\"\ntype = \"EL6692\"\non = \"K1.B\"\n\
+[[device.start_up]]\ntransition = \"IP\"\nnet_id = \"10.0.0.7.3.1\"\n";
+
+#[test]
+fn subdevice_with_a_net_id_is_reached_by_it_and_by_the_command_line() {
+    for read_only in [false, true] {
+        let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let listen = address.to_string();
+        let options = ["--ads", &listen, "--ads-read-only"];
+        let plant = BRIDGE.split("[[device.start_up]]").next().unwrap();
+        let options = &options[..2 + usize::from(read_only)];
+        let running = Running::with_files(plant, &[("project.toml", BRIDGE)], options);
+        let mut client = Client::new(address);
+        client.net_id = AmsNetId([10, 0, 0, 7, 3, 1]);
+        assert_eq!(client.read(MAIN, index::SDO, object(0x1018, 1), 4), Ok(vec![2, 0, 0, 0]));
+        assert_eq!(client.read(0x1000, index::SDO, object(0x1008, 0), 4), Ok(b"EL66".to_vec()));
+        assert_eq!(client.result(MAIN, &AdsRequest::State), (0, vec![5, 0, 8, 0]));
+        let (result, info) = client.result(MAIN, &AdsRequest::DeviceInfo);
+        assert_eq!((result, &info[4..10]), (0, &b"EL6692"[..]));
+        assert_eq!(client.read(MAIN, index::SDO, object(0x5555, 0), 4), Err(0x70C));
+        assert_eq!(client.read(851, index::SDO, object(0x1018, 1), 4), Err(0x6));
+        let written = client.write(MAIN, index::SDO, object(0x10F1, 2), &[8, 0]);
+        assert_eq!(written, if read_only { 0x704 } else { 0 });
+        // Notifications are not passed on.
+        assert_eq!(client.ask(MAIN, 6, &[0; 40]).1[..4], [0x01, 0x07, 0, 0]);
+        client.net_id = AmsNetId([10, 0, 0, 7, 4, 1]);
+        let (command, data) = AdsRequest::Read { group: 6, offset: 0, len: 2 }.to_bytes();
+        assert_eq!(client.ask(MAIN, command, &data), (7, Vec::new()), "nobody's NetId");
+        assert_eq!(running.status()["devices"][1]["net_id"], "10.0.0.7.3.1");
+        let socket = running.socket();
+        let read = linesman(["aoe", &socket, "B1", "read", "0xF302", "0x10180001", "--json"]);
+        assert_eq!(read.json()["data"], "02000000", "{}", read.all());
+        crate::support::assert_valid(&read.json(), "ads");
+        let refused = linesman([
+            "aoe",
+            &socket,
+            "B1",
+            "read",
+            "0x99",
+            "0",
+            "--net-id",
+            "1.2.3.4.5.6",
+            "--json",
+        ]);
+        assert_eq!((refused.status, &refused.json()["kind"]), (1, &"ads-error".into()));
+        assert_eq!(refused.json()["code"], 7, "{}", refused.all());
+    }
+}
+
 #[test]
 fn garbage_half_messages_and_floods_leave_the_line_alone() {
     let (running, address) = running(&[]);

@@ -13,6 +13,7 @@ use linesman_proto::ads::{
 
 use super::counts::{AdsCounts, AdsReport};
 use super::own_net_id;
+use super::pass::by_net_id;
 use super::services::{AdsNetwork, AdsServices};
 use crate::control_socket::RequestSender;
 use crate::network_access::NetworkAccess;
@@ -94,6 +95,12 @@ impl AdsShared {
         self.aborts.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// True if a SubDevice has this NetId; one that may not ask now is not told.
+    fn is_sub_device(&self, net_id: AmsNetId, admitted: bool) -> bool {
+        let report = admitted.then(|| AdsNetwork::report(self)).flatten();
+        report.is_some_and(|report| by_net_id(&report, net_id).is_some())
+    }
+
     /// The answer to a message: its frame; `None` to one that is not to be answered.
     fn answer(&self, connection: &ServedConnection<'_>, message: &[u8]) -> Option<Vec<u8>> {
         let refused = |header: &AmsHeader, code| {
@@ -119,9 +126,6 @@ impl AdsShared {
                 && connection
                     .own_address()
                     .is_ok_and(|own| own_net_id(own) == header.target.net_id);
-        if !is_ours {
-            return refused(&header, AdsCode::MACHINE_NOT_FOUND);
-        }
         let admitted = {
             let mut rates = self.rates.lock().unwrap_or_else(PoisonError::into_inner);
             rates.admit(connection.host(), self.started.elapsed())
@@ -133,12 +137,22 @@ impl AdsShared {
         };
         let answer = match AdsRequest::parse(header.command, data) {
             Err(AdsCode::UNKNOWN_COMMAND) => return refused(&header, AdsCode::UNKNOWN_COMMAND),
+            Err(_) if !is_ours && !self.is_sub_device(header.target.net_id, admitted) => {
+                return refused(&header, AdsCode::MACHINE_NOT_FOUND);
+            }
             Err(code) => AdsAnswer::Refused(code),
             Ok(_) if !admitted => AdsAnswer::Refused(AdsCode::BUSY),
-            Ok(request) => match services.answer(header.target.port, &request) {
-                Ok(answer) => answer,
-                Err(code) => return refused(&header, code),
-            },
+            Ok(request) => {
+                let answer = if is_ours {
+                    services.answer(header.target.port, &request)
+                } else {
+                    services.pass(&header, &request)
+                };
+                match answer {
+                    Ok(answer) => answer,
+                    Err(code) => return refused(&header, code),
+                }
+            }
         };
         self.counts.answer(answer.result());
         Some(header.answer(AdsCode::OK).frame(&answer.to_bytes(header.command)))

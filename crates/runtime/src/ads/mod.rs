@@ -8,6 +8,7 @@
 mod connections;
 mod counts;
 mod datagram;
+mod pass;
 mod services;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use linesman_proto::ads::{AdsAnswer, AdsCode, AdsRequest, AmsAddress, AmsNetId, index};
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
-use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use linesman_proto::state::AlState;
 
 use super::datagram::{RegisterDatagram, RegisterTarget};
@@ -47,7 +46,7 @@ pub(super) struct AdsServices<'a, N> {
 }
 
 /// Answer to a service, or the code by which it is refused.
-type AdsOutcome<T> = Result<T, AdsCode>;
+pub(super) type AdsOutcome<T> = Result<T, AdsCode>;
 
 impl<N: AdsNetwork> AdsServices<'_, N> {
     /// The answer of a port.
@@ -205,14 +204,14 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
                 Ok(AdsAnswer::State { ads: AdsAnswer::RUN, device })
             }
             AdsRequest::Read { group: index::SDO, offset, .. } => {
-                let (object, complete) = object(offset);
+                let (object, complete) = index::object(offset);
                 let (index, subindex) = (object.index.0, object.subindex);
                 let upload = Asked::Upload { index, subindex, complete };
                 self.access(device, upload).map(AdsAnswer::Read)
             }
             AdsRequest::Write { group: index::SDO, offset, data } => {
                 self.may_write()?;
-                let (object, complete) = object(offset);
+                let (object, complete) = index::object(offset);
                 let (index, subindex) = (object.index.0, object.subindex);
                 let download = Asked::Download { index, subindex, complete, data: to_hex(data) };
                 self.access(device, download).map(|_| AdsAnswer::Done)
@@ -248,7 +247,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         given(answer.as_ref())
     }
 
-    fn mailbox(&self, device: &OnlineDevice, asked: Asked) -> AdsOutcome<Vec<u8>> {
+    pub(super) fn mailbox(&self, device: &OnlineDevice, asked: Asked) -> AdsOutcome<Vec<u8>> {
         self.has_mailbox(device)?;
         self.one(serve(device, asked))
     }
@@ -267,7 +266,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
     /// An object of the MainDevice itself.
     fn own_object(&self, report: &OnlineReport, offset: u32) -> AdsOutcome<Vec<u8>> {
         let objects = own_objects(report);
-        let (object, complete) = object(offset);
+        let (object, complete) = index::object(offset);
         let read = if complete {
             objects.upload_all(object, AlState::Op).map(|mut data| {
                 if CONFIGURED.contains(&object.index.0) {
@@ -316,7 +315,7 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
         })
     }
 
-    const fn may_write(&self) -> AdsOutcome<()> {
+    pub(super) const fn may_write(&self) -> AdsOutcome<()> {
         if self.read_only { Err(AdsCode::NOT_PERMITTED) } else { Ok(()) }
     }
 
@@ -332,11 +331,15 @@ impl<N: AdsNetwork> AdsServices<'_, N> {
 /// Kind of a refusal: an abort of an SDO transfer.
 const SDO_ABORT: &str = "sdo-abort";
 
+/// Kind of a refusal: a return code of ADS.
+const ADS_ERROR: &str = "ads-error";
+
 /// The data that a service gave.
 fn given(answer: Result<&Answer, &AdsCode>) -> AdsOutcome<Vec<u8>> {
     let answer = answer.map_err(|code| *code)?;
     if let Some(refusal) = &answer.refusal {
         return Err(match refusal.kind.as_str() {
+            ADS_ERROR => AdsCode(refusal.code),
             SDO_ABORT => AdsCode::of_abort(SdoAbortCode(refusal.code)),
             "al-status" => AdsCode::INVALID_STATE,
             _ => AdsCode::GENERAL,
@@ -370,14 +373,6 @@ fn device_info(name: &str) -> AdsAnswer {
     let mut next = || numbers.next().unwrap_or(0);
     let (major, minor, build) = (next() as u8, next() as u8, next());
     AdsAnswer::DeviceInfo { major, minor, build, name: name.to_owned() }
-}
-
-/// The object of an offset, and whether all its entries are meant.
-const fn object(offset: u32) -> (ObjectAddress, bool) {
-    let [subindex, flags, low, high] = offset.to_le_bytes();
-    let index = ObjectIndex(u16::from_le_bytes([low, high]));
-    let complete = (flags as u32) << 8 & index::SDO_COMPLETE != 0;
-    (ObjectAddress { index, subindex }, complete)
 }
 
 /// Drive, number and elements of an offset.

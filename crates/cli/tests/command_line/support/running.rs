@@ -43,6 +43,12 @@ impl Running {
         Self::run(plant, &[], options)
     }
 
+    /// The same of a plant of this project, with these files beside it and these options.
+    #[track_caller]
+    pub(crate) fn with_files(plant: &str, files: &[(&str, &str)], options: &[&str]) -> Self {
+        Self::run(plant, files, options)
+    }
+
     #[track_caller]
     fn run(plant: &str, files: &[(&str, &str)], options: &[&str]) -> Self {
         let folder = TempDir::new().unwrap();
