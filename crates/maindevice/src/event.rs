@@ -14,7 +14,7 @@ use linesman_proto::state::{AlState, AlStatusCode};
 use linesman_proto::time::Span;
 
 use crate::exchange::{ExchangeError, Reply};
-use crate::mailbox::MailboxFailure;
+use crate::mailbox::{FileProgress, MailboxFailure};
 use crate::main_device::ProbeRequest;
 use crate::procedure::{ClockError, ReadOnlyScan, ReadOnlyScanError, ScanError};
 use crate::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
@@ -373,6 +373,13 @@ pub enum Event {
         id: DeviceId,
         /// What it says.
         emergency: Emergency,
+    },
+    /// The transfer of a file has come so far; told ten times a second at most.
+    FileProgress {
+        /// Whose.
+        id: DeviceId,
+        /// How far.
+        progress: FileProgress,
     },
     /// A mailbox message that nobody had asked for.
     Mailbox {

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use linesman_config::inventory::{FoundDevice, Inventory};
 use linesman_config::plan::{DevicePlan, Plan, PlanOptions};
 use linesman_diagnosis::{Diagnosis, Engine, FrameSeen, HostObservation, Setup};
+use linesman_maindevice::mailbox::FileProgress;
 use linesman_maindevice::procedure::ScanError;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::{Event, MainDevice};
@@ -88,6 +89,11 @@ impl<L: Transport> ServiceSession<L> {
         self.hooks().emergencies.drain(..).collect()
     }
 
+    /// Calls this with the progress of files, from now on.
+    pub fn on_file_progress(&mut self, told: impl FnMut(&FileProgress) + Send + 'static) {
+        self.hooks().file_progress = Some(Box::new(told));
+    }
+
     const fn hooks(&mut self) -> &mut ServiceHooks {
         self.driver.session_mut().hooks_mut()
     }
@@ -135,7 +141,11 @@ struct ServiceHooks {
     scanned: Option<Result<Inventory, ScanError>>,
     served: Option<Result<ServiceAnswer, ServiceFailure>>,
     emergencies: VecDeque<(DeviceId, String)>,
+    file_progress: Option<FileProgressHook>,
 }
+
+/// Whom progress of files is told.
+type FileProgressHook = Box<dyn FnMut(&FileProgress) + Send>;
 
 impl SessionHooks for ServiceHooks {
     fn frame(&mut self, frame: &FrameSeen<'_>) {
@@ -157,6 +167,10 @@ impl SessionHooks for ServiceHooks {
             (self.scanned, self.done) = (Some(Err(error)), true);
         } else if let Event::Emergency { id, emergency } = event {
             self.emergencies.push_back((id, emergency.to_string()));
+        } else if let Event::FileProgress { progress, .. } = &event {
+            if let Some(told) = &mut self.file_progress {
+                told(progress);
+            }
         } else if let Event::Served { ticket, result, .. } = event
             && self.ticket == Some(ticket)
         {

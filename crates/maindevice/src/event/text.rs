@@ -146,6 +146,7 @@ impl Event {
             | Self::CyclicFramesBack { .. }
             | Self::Emergency { .. }
             | Self::Mailbox { .. }
+            | Self::FileProgress { .. }
             | Self::SdoUploaded { .. }
             | Self::SdoDownloaded { .. }
             | Self::Served { .. }

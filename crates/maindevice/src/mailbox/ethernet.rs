@@ -6,8 +6,7 @@
 
 use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::eoe::{self, fragments};
-
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
 use super::failure::{Step, Why};
 use super::transaction::MailboxTransaction;
@@ -38,4 +37,34 @@ pub(crate) async fn send_frame(
     transaction.multiplexer.drain().await;
     let again = transaction.multiplexer.repetitions().wrapping_sub(before);
     Ok([sent.to_le_bytes(), again.to_le_bytes()].concat())
+}
+
+/// A SubDevice may refuse a fragment of an Ethernet frame so long after it took it.
+const FRAGMENT_REFUSED_WITHIN: Span = Span::s(2);
+
+/// Fragments of Ethernet frames that a SubDevice may still refuse.
+///
+/// Nothing answers a fragment but an error reply, and that does not say which message it is about. Messages are answered
+/// in order: so many error replies as there are fragments before a request may be about those, and the next one is not.
+#[derive(Clone, Copy, Default, Debug)]
+pub(super) struct UnansweredFragments {
+    count: u32,
+    /// When the last one was sent.
+    last: Instant,
+}
+
+impl UnansweredFragments {
+    pub(super) fn sent(&mut self, now: Instant) {
+        *self = Self { count: self.count.saturating_add(1), last: now };
+    }
+
+    /// An error reply came. True if it may be about a fragment.
+    pub(super) fn refused(&mut self, now: Instant) -> bool {
+        if now >= self.last + FRAGMENT_REFUSED_WITHIN {
+            self.count = 0;
+        }
+        let is_about_fragment = self.count > 0;
+        self.count = self.count.saturating_sub(1);
+        is_about_fragment
+    }
 }

@@ -40,8 +40,15 @@ pub enum Step {
     Segment(u32),
     /// A fragment of a description, from 1.
     Fragment(u32),
-    /// A packet of a file, from 1.
-    Packet(u32),
+    /// A packet of a file.
+    Packet {
+        /// Which, from 1.
+        number: u32,
+        /// Bytes of the file that are through.
+        done: usize,
+        /// Bytes of the whole file; `None` while nobody knows, as in reading.
+        total: Option<usize>,
+    },
 }
 
 impl fmt::Display for Step {
@@ -51,7 +58,12 @@ impl fmt::Display for Step {
             Self::Request => f.write_str("the request"),
             Self::Segment(number) => write!(f, "segment {number}"),
             Self::Fragment(number) => write!(f, "fragment {number}"),
-            Self::Packet(number) => write!(f, "packet {number}"),
+            Self::Packet { number, done, total: Some(total) } => {
+                write!(f, "packet {number}, {done} of {total} bytes through")
+            }
+            Self::Packet { number, done, total: None } => {
+                write!(f, "packet {number}, {done} bytes through")
+            }
         }
     }
 }
@@ -269,6 +281,11 @@ impl fmt::Display for MailboxFailure {
             write!(f, ", {step}")?;
         }
         write!(f, ": {why}")?;
+        if matches!(step, Step::Packet { .. }) && !why.is_refusal() {
+            f.write_str(
+                "; FoE cannot go on where it stopped, the file has to be sent anew as a whole",
+            )?;
+        }
         let advice = why.advice().trim_end_matches('.');
         let mut letters = advice.chars();
         match letters.next() {

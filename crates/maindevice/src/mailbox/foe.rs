@@ -8,6 +8,7 @@ use linesman_proto::mailbox::foe::{FoeErrorCode, Message, chunk_len};
 use linesman_proto::time::Span;
 
 use super::failure::{Step, Why};
+use super::progress::FileBusy;
 use super::transaction::MailboxTransaction;
 
 /// The longest file that is fetched, in bytes.
@@ -31,8 +32,9 @@ pub(crate) async fn read(
         let answer = ask(transaction, &question).await?;
         match Message::parse(&answer) {
             Ok(Message::Data { packet, data }) if packet == expected => {
-                transaction.step = Step::Packet(packet);
                 file.extend_from_slice(data);
+                transaction.step = Step::Packet { number: packet, done: file.len(), total: None };
+                transaction.tell_progress(None);
                 if file.len() > LONGEST {
                     give_up(transaction, FoeErrorCode::DISK_FULL).await;
                     return Err(Why::TooLong { limit: LONGEST });
@@ -76,7 +78,8 @@ pub(crate) async fn write(
     let mut at = 0;
     loop {
         packet = packet.wrapping_add(1);
-        transaction.step = Step::Packet(packet);
+        transaction.step = Step::Packet { number: packet, done: at, total: Some(data.len()) };
+        transaction.tell_progress(None);
         let rest = data.get(at..).unwrap_or_default();
         let piece = rest.get(..chunk).unwrap_or(rest);
         acknowledged(transaction, &Message::Data { packet, data: piece }, packet).await?;
@@ -120,10 +123,14 @@ async fn ask(
     loop {
         transaction.say(MailboxType::Foe, |body| message.write(body)).await?;
         let answer = transaction.hear(MailboxType::Foe).await?;
-        let Ok(Message::Busy { text, .. }) = Message::parse(&answer) else { return Ok(answer) };
+        let Ok(Message::Busy { done, total, text }) = Message::parse(&answer) else {
+            return Ok(answer);
+        };
+        let busy = FileBusy { done, total, text: words(text) };
         if transaction.multiplexer.now().since(began) >= BUSY_LIMIT {
-            return Err(Why::Busy { patience: BUSY_LIMIT, text: words(text) });
+            return Err(Why::Busy { patience: BUSY_LIMIT, text: busy.to_string() });
         }
+        transaction.tell_progress(Some(busy));
         transaction.multiplexer.pause(PAUSE).await;
     }
 }

@@ -15,6 +15,7 @@ mod information;
 mod mapped;
 pub(crate) mod multiplexer;
 mod pass;
+mod progress;
 mod protocol_errors;
 pub(crate) mod queue;
 mod request;
@@ -29,6 +30,7 @@ use crate::executor::lock;
 use crate::supervisor::Context;
 
 pub use failure::{MailboxFailure, Step, Why};
+pub use progress::{FileBusy, FileProgress};
 pub use protocol_errors::{ProtocolError, ProtocolErrors};
 pub use request::{MailboxOperation, MailboxRequest};
 

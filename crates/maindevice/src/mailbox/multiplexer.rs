@@ -13,6 +13,7 @@ use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::time::{Instant, Span};
 
 use super::MailboxQueues;
+use super::ethernet::UnansweredFragments;
 use super::failure::Why;
 use super::pass::PassedTransfer;
 use crate::event::Event;
@@ -30,36 +31,6 @@ const REPEAT_LIMIT: Span = Span::ms(100);
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long while an answer is
 /// waited for: cyclic frames may be lost.
 const UNSEEN: Span = Span::ms(50);
-
-/// A SubDevice may refuse a fragment of an Ethernet frame so long after it took it.
-const FRAGMENT_REFUSED_WITHIN: Span = Span::s(2);
-
-/// Fragments of Ethernet frames that a SubDevice may still refuse.
-///
-/// Nothing answers a fragment but an error reply, and that does not say which message it is about. Messages are answered
-/// in order: so many error replies as there are fragments before a request may be about those, and the next one is not.
-#[derive(Clone, Copy, Default, Debug)]
-struct UnansweredFragments {
-    count: u32,
-    /// When the last one was sent.
-    last: Instant,
-}
-
-impl UnansweredFragments {
-    fn sent(&mut self, now: Instant) {
-        *self = Self { count: self.count.saturating_add(1), last: now };
-    }
-
-    /// An error reply came. True if it may be about a fragment.
-    fn refused(&mut self, now: Instant) -> bool {
-        if now >= self.last + FRAGMENT_REFUSED_WITHIN {
-            self.count = 0;
-        }
-        let is_about_fragment = self.count > 0;
-        self.count = self.count.saturating_sub(1);
-        is_about_fragment
-    }
-}
 
 /// A register byte of one of the two SyncManagers.
 fn byte_of(manager: u16, at: u16) -> RegisterAddress {
@@ -474,6 +445,11 @@ impl Multiplexer {
         }
         self.unasked(kind, message.data.to_vec());
         Ok(None)
+    }
+
+    /// Tells how far a file has come.
+    pub(crate) fn progress(&self, progress: super::FileProgress) {
+        self.wire.emit(Event::FileProgress { id: self.id, progress });
     }
 
     /// Tells of a message that nobody waits for.

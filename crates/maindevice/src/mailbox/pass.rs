@@ -5,6 +5,7 @@
 //! object, the packets of a file) nobody else may speak to the SubDevice, or it would give the transfer up: whether
 //! one is under way is read off the messages.
 
+use linesman_proto::ads::AmsHeader;
 use linesman_proto::mailbox::coe::information::Body;
 use linesman_proto::mailbox::coe::sdo::{Request, Response};
 use linesman_proto::mailbox::coe::{Message as CoeMessage, ObjectAddress};
@@ -51,7 +52,9 @@ pub(crate) async fn pass(
             }
             Err(why) => return Err(why),
         };
-        if transaction.multiplexer.may_be_late() && !belongs(kind, data, &answer) {
+        // ADS numbers its requests, and a SubDevice may send some of its own.
+        let may_be_other = transaction.multiplexer.may_be_late() || kind == MailboxType::Aoe;
+        if may_be_other && !belongs(kind, data, &answer) {
             transaction.multiplexer.unasked(kind, answer);
             continue;
         }
@@ -143,6 +146,14 @@ fn continues(kind: MailboxType, answer: &[u8]) -> bool {
 /// False if an answer is about something else than the message, such as the late one to a transfer that was given
 /// up.
 fn belongs(kind: MailboxType, data: &[u8], answer: &[u8]) -> bool {
+    if kind == MailboxType::Aoe {
+        return match (AmsHeader::parse(data), AmsHeader::parse(answer)) {
+            (Ok((asked, _)), Ok((answered, _))) => {
+                answered.is_answer() && answered.invoke_id == asked.invoke_id
+            }
+            (Err(_), _) | (_, Err(_)) => true,
+        };
+    }
     if kind != MailboxType::Coe {
         return true;
     }
@@ -307,5 +318,10 @@ mod tests {
         assert!(!belongs(coe, &upload, &[0, 0x30, 0x01, 1, 2, 3, 4, 5, 6, 7]), "a segment");
         assert!(!belongs(coe, &upload, &[0, 0x80, 0x02, 0, 0, 0, 1, 0]), "a list");
         assert!(belongs(coe, &upload, &[0, 0x20, 0x80, 0x18, 0x10, 1, 0, 0, 2, 6]), "an abort");
+        let ads = |flags: u16, invoke_id| AmsHeader { flags, invoke_id, ..AmsHeader::default() };
+        let asked = ads(4, 7).message(&[]);
+        assert!(belongs(MailboxType::Aoe, &asked, &ads(5, 7).message(&[0; 4])));
+        assert!(!belongs(MailboxType::Aoe, &asked, &ads(5, 6).message(&[0; 4])), "a late one");
+        assert!(!belongs(MailboxType::Aoe, &asked, &ads(4, 7).message(&[])), "its own request");
     }
 }

@@ -457,6 +457,38 @@ fn a_file_is_written_and_an_empty_packet_ends_it() {
     assert_eq!(scripted.heard[4], packet(3, &[]), "the others filled the mailbox");
 }
 
+#[test]
+fn progress_of_a_file_is_told_and_where_it_broke_off() {
+    let whole: Vec<u8> = (0..50).collect();
+    let busy = [&[6, 0, 1, 0, 4, 0][..], b"erasing"].concat();
+    let mut scripted = Scripted::of_files(&[&ack(0), &busy, &ack(1), &busy, &busy, &ack(2)]);
+    let request = MailboxRequest::WriteFile { name: "a".to_owned(), password: 0, data: whole };
+    let (outcome, events) = run(&mut scripted, request);
+    // Told ten times a second at most: the first packet, then what the SubDevice is busy with is too soon.
+    let told: Vec<String> = events
+        .iter()
+        .filter_map(|event| match event {
+            Event::FileProgress { progress, .. } => Some(progress.to_string()),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(told, ["0 of 50 bytes"]);
+    let failure = outcome.unwrap_err().to_string();
+    assert!(failure.contains("packet 3, 40 of 50 bytes through: no answer"), "{failure}");
+    // Busy for ever: told again and again with how far that is, and given up in the end.
+    let again: Vec<&[u8]> = std::iter::repeat_n(&busy[..], 7_000).collect();
+    let mut scripted = Scripted::of_files(&again);
+    let request = MailboxRequest::ReadFile { name: "log".to_owned(), password: 0 };
+    let (outcome, events) = run(&mut scripted, request);
+    let failure = outcome.unwrap_err().to_string();
+    assert!(failure.contains("busy for 120 s: erasing, 25 %"), "{failure}");
+    let busy = "0 bytes, the SubDevice is busy: erasing, 25 %";
+    let told = events.iter().filter(
+        |event| matches!(event, Event::FileProgress { progress, .. } if progress.to_string() == busy),
+    );
+    assert!((1_000..=1_201).contains(&told.count()), "ten times a second at most");
+}
+
 // proves: SW-11 partial: texts and codes; the segment has them on a public surface
 #[test]
 fn files_that_are_refused_say_why() {
@@ -477,7 +509,9 @@ fn files_that_are_refused_say_why() {
     assert!(failure.to_string().contains("packet 2 instead of 1"), "{failure}");
     let mut silent = Scripted::of_files(&[&ack(0)]);
     let failure = write_file(&mut silent, &[1; 30]).unwrap_err();
-    assert!(failure.to_string().contains("packet 1: no answer within 10 s"), "{failure}");
+    let text = failure.to_string();
+    assert!(text.contains("packet 1, 0 of 30 bytes through: no answer within 10 s"), "{text}");
+    assert!(text.contains("FoE cannot go on where it stopped"), "{text}");
     let name = "a name that does not fit into a mailbox".to_owned();
     let request = MailboxRequest::ReadFile { name, password: 0 };
     let failure = run(&mut Scripted::of_files(&[]), request).0.unwrap_err();

@@ -6,6 +6,7 @@ use linesman_proto::time::{Instant, Span};
 
 use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
+use super::progress::{FileBusy, FileProgress, PROGRESS_INTERVAL};
 use super::request::MailboxRequest;
 use super::{aoe, coe, ethernet, foe, information, pass, settings, voe};
 
@@ -27,6 +28,8 @@ pub(crate) struct MailboxTransaction<'a> {
     /// How long each answer is waited for.
     pub(crate) patience: Span,
     until: Instant,
+    /// When progress is told again.
+    next_progress: Instant,
 }
 
 /// Does an operation from its first message to its last.
@@ -51,7 +54,9 @@ pub(crate) async fn perform(
             | MailboxType::Voe
             | MailboxType::Reserved(_) => patience,
         };
-        let mut transaction = MailboxTransaction { multiplexer, step, patience, until };
+        let next_progress = until;
+        let mut transaction =
+            MailboxTransaction { multiplexer, step, patience, until, next_progress };
         let result = transaction.go(request).await;
         step = transaction.step;
         result
@@ -136,6 +141,20 @@ impl MailboxTransaction<'_> {
     /// Something came, and more is to come: it is waited for as long again.
     pub(crate) fn wait_anew(&mut self) {
         self.until = self.multiplexer.now() + self.patience;
+    }
+
+    /// Tells how far a file has come, if it is time.
+    pub(crate) fn tell_progress(&mut self, busy: Option<FileBusy>) {
+        let now = self.multiplexer.now();
+        if now < self.next_progress {
+            return;
+        }
+        self.next_progress = now + PROGRESS_INTERVAL;
+        let (done, total) = match self.step {
+            Step::Packet { done, total, .. } => (done, total),
+            Step::Before | Step::Request | Step::Segment(_) | Step::Fragment(_) => (0, None),
+        };
+        self.multiplexer.progress(FileProgress { done, total, busy });
     }
 
     /// An answer may or may not come: it is waited for so long.

@@ -1,5 +1,7 @@
 //! Service client of a line on real cards: listen first, scan, then serve.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use linesman_config::inventory::Inventory;
 use linesman_diagnosis::{Diagnosis, InputKind, Setup};
 use linesman_link::clock::HostClock;
@@ -13,6 +15,7 @@ use linesman_runtime::transport::Cards;
 use super::{ServiceClient, ServiceRefused};
 use crate::command::line_access;
 use crate::failure::Failure;
+use crate::output::Progress;
 
 /// A scan of a thousand SubDevices takes a few seconds.
 const SCAN_PATIENCE: Span = Span::s(60);
@@ -24,6 +27,7 @@ pub(super) struct CardClient {
     session: ServiceSession<Cards>,
     stop: Stop,
     name: String,
+    progress: Arc<Mutex<Progress>>,
 }
 
 /// Opens and scans the line.
@@ -39,7 +43,13 @@ pub(super) fn open(names: &[String]) -> Result<(CardClient, Inventory), Failure>
         ..Setup::default()
     };
     let session = ServiceSession::new(Cards::open(names, clock)?, Some(setup));
-    let mut cards = CardClient { session, stop, name: names.join("+") };
+    let progress = Arc::new(Mutex::new(Progress::new()));
+    let mut cards =
+        CardClient { session, stop, name: names.join("+"), progress: Arc::clone(&progress) };
+    cards.session.on_file_progress(move |file| {
+        let mut progress = progress.lock().unwrap_or_else(PoisonError::into_inner);
+        progress.show(|| file.to_string());
+    });
     let inventory = match cards.session.scan(SCAN_PATIENCE, &cards.stop)? {
         Some(Ok(inventory)) => inventory,
         Some(Err(error)) => {
@@ -66,7 +76,9 @@ impl ServiceClient for CardClient {
         id: DeviceId,
         service: Service,
     ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
-        let served = self.session.ask(id, service, SERVICE_PATIENCE, &self.stop)?;
+        let served = self.session.ask(id, service, SERVICE_PATIENCE, &self.stop);
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        let served = served?;
         let served = served.ok_or_else(|| self.interrupted())?;
         Ok(served.map_err(|failure| ServiceRefused::from(&failure)))
     }
