@@ -1,6 +1,7 @@
-//! A complete virtual device behind its mailbox: states, queue, CoE, FoE, BOOT.
+//! A complete virtual device behind its mailbox: states, queue, AoE, CoE, EoE, FoE, VoE, BOOT.
 
 use linesman_proto::address::{Path, RegisterAddress};
+use linesman_proto::ads::AmsHeader;
 use linesman_proto::command::Command;
 use linesman_proto::ethernet::MacAddress;
 use linesman_proto::frame::builder::DatagramAddress;
@@ -17,16 +18,13 @@ use crate::series::series;
 /// More steps bring nothing new.
 const MOST_STEPS: usize = 96;
 
-const FILE: &str = r#"
-[[device]]
-name = "D1"
-type = "EK1100"
-on = "maindevice"
-[[device]]
-name = "D2"
-type = "EL6601"
-on = "D1.B"
-"#;
+/// A coupler, and a terminal of this type.
+fn plant(type_name: &str) -> String {
+    format!(
+        "[[device]]\nname = \"D1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
+         [[device]]\nname = \"D2\"\ntype = \"{type_name}\"\non = \"D1.B\"\n"
+    )
+}
 
 struct Rig {
     segment: Segment,
@@ -38,8 +36,8 @@ struct Rig {
 }
 
 impl Rig {
-    fn new() -> Self {
-        let file = SegmentFile::parse(FILE).expect("a segment");
+    fn new(type_name: &str) -> Self {
+        let file = SegmentFile::parse(&plant(type_name)).expect("a segment");
         let segment = Segment::build(&file).expect("a segment");
         let last = segment.devices().last().expect("two devices");
         let sii = segment.controller(last).expect("it is there").sii().to_vec();
@@ -114,6 +112,16 @@ impl Rig {
         let message = Message::parse(&data).expect("an answer is a message");
         match message.header.kind.code() {
             0 => assert!(message.data.len() == 4),
+            1 => {
+                let parsed = AmsHeader::parse(message.data);
+                assert!(
+                    parsed.is_ok_and(|(header, _)| header.is_answer()),
+                    "{:02X?}",
+                    message.data
+                );
+            }
+            // What a vendor says means nothing to others.
+            15 => {}
             3 => assert!(coe::Message::parse(message.data).is_ok(), "{:02X?}", message.data),
             2 => assert!(eoe::Message::parse(message.data).is_ok(), "{:02X?}", message.data),
             4 => assert!(foe::Message::parse(message.data).is_ok(), "{:02X?}", message.data),
@@ -125,8 +133,8 @@ impl Rig {
 
 /// Whatever is put into its mailbox, and whatever state is asked for, a device answers with messages,
 /// and after INIT it works again.
-pub fn drive(data: &[u8]) {
-    let mut rig = Rig::new();
+pub fn drive(type_name: &str, data: &[u8]) {
+    let mut rig = Rig::new(type_name);
     rig.set_up(rig.standard);
     rig.request(2);
     for step in series(data).take(MOST_STEPS) {

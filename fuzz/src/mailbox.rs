@@ -1,5 +1,6 @@
 //! Mailbox messages: header, protocol, answer; and a device that gets them.
 
+use linesman_proto::ads::{AdsAnswer, AdsCommand, AmsHeader};
 use linesman_proto::mailbox::coe::information::{EntryDescription, ObjectDescription, ObjectList};
 use linesman_proto::mailbox::coe::{DiagnosisMessage, Message as CoeMessage};
 use linesman_proto::mailbox::foe::Message as FoeMessage;
@@ -7,7 +8,9 @@ use linesman_proto::mailbox::{ErrorReply, Message};
 
 /// Any bytes may lie in a mailbox. A CoE message that is read and written again is the same one.
 pub fn mailbox(data: &[u8]) {
-    crate::device::drive(data);
+    // A switch terminal has files and Ethernet, a bridge speaks AoE and VoE.
+    crate::device::drive("EL6601", data);
+    crate::device::drive("EL6692", data);
     codec(data);
 }
 
@@ -22,10 +25,26 @@ fn codec(data: &[u8]) {
         let len = file.write(&mut buffer).expect("no longer than it was");
         assert_eq!(FoeMessage::parse(&buffer[..len]), Ok(file));
     }
+    if let Ok((header, data)) = AmsHeader::parse(message.data) {
+        assert_eq!(header.message(data), message.data);
+        let command = AdsCommand::from_number(header.command);
+        let _ = command.map(|command| AdsAnswer::parse(command, data));
+    }
     let _ = DiagnosisMessage::parse(message.data).map(|note| note.parameters().count());
     let Ok(coe) = CoeMessage::parse(message.data) else { return };
     let mut buffer = [0_u8; 0x1_0000];
     let Ok(len) = coe.write(&mut buffer) else { return };
     let again = CoeMessage::parse(&buffer[..len]).expect("what we write is a message");
     assert_eq!(again, coe);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mailbox;
+
+    #[test]
+    fn requests_of_ads_leave_the_device_at_work() {
+        mailbox(include_bytes!("../corpus/mailbox/ads-device"));
+        mailbox(include_bytes!("../corpus/mailbox/ads-message"));
+    }
 }

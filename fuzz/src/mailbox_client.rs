@@ -9,6 +9,7 @@ use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::Service;
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::{DeviceId, Network, RegisterAddress};
+use linesman_proto::ads::{AdsCommand, AdsRequest, index};
 use linesman_proto::command::Command;
 use linesman_proto::ethernet::MAX_LEN;
 use linesman_proto::frame::FrameView;
@@ -81,7 +82,7 @@ fn request(choice: u8) -> MailboxRequest {
     let object = ObjectAddress::new(0x1018, 1);
     let whole = ObjectAddress::new(0x1C12, 0);
     let name = || "file.bin".to_owned();
-    match choice % 9 {
+    match choice % 12 {
         0 => MailboxRequest::Upload { object, complete: false },
         1 => MailboxRequest::Upload { object: whole, complete: true },
         2 => MailboxRequest::Download { object, complete: false, data: vec![1, 2] },
@@ -90,8 +91,20 @@ fn request(choice: u8) -> MailboxRequest {
         5 => MailboxRequest::DescribeObject { index: ObjectIndex(0x1018) },
         6 => MailboxRequest::DescribeEntry { object, values: ValueInfo(0) },
         7 => MailboxRequest::ReadFile { name: name(), password: 0 },
+        9 => ads(&AdsRequest::Read { group: index::SDO, offset: 0x1018_0001, len: 4 }),
+        10 => ads(&AdsRequest::DeviceInfo),
+        11 => MailboxRequest::SendVendorMessage {
+            data: vec![2, 0, 0, 0, 1, 0],
+            answer_within: Span::ms(50),
+        },
         _ => MailboxRequest::WriteFile { name: name(), password: 0, data: vec![9; 400] },
     }
+}
+
+fn ads(request: &AdsRequest<'_>) -> MailboxRequest {
+    let (number, data) = request.to_bytes();
+    let command = AdsCommand::from_number(number).expect("it is known");
+    MailboxRequest::Ads { net_id: None, port: 0xFFFF, source: None, command, data }
 }
 
 struct Rig {
