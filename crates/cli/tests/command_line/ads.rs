@@ -8,7 +8,7 @@ use linesman_proto::ads::{AMS_TCP_HEADER_LEN, AdsRequest, AmsAddress, AmsHeader,
 use serde_json::Value;
 
 use crate::support::linesman;
-use crate::support::running::Running;
+use crate::support::running::{Running, project_of};
 
 /// A coupler without a mailbox, two SubDevices that speak CoE, a drive.
 const PLANT: &str = "\
@@ -256,11 +256,13 @@ fn read_only_server_changes_nothing() {
     assert_eq!(running.status()["ads"]["read_only"], true);
 }
 
-/// The drive's place is taken by a bridge that speaks AoE, whose project gives it a NetId.
-const BRIDGE: &str = "\
+/// A bridge that speaks AoE.
+pub(crate) const BRIDGE: &str = "\
 [[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
-[[device]]\nname = \"B1\"\ntype = \"EL6692\"\non = \"K1.B\"\n\
-[[device.start_up]]\ntransition = \"IP\"\nnet_id = \"10.0.0.7.3.1\"\n";
+[[device]]\nname = \"B1\"\ntype = \"EL6692\"\non = \"K1.B\"\n";
+/// The NetId that a project gives it.
+pub(crate) const BRIDGE_NET_ID: &str =
+    "[[device.start_up]]\ntransition = \"IP\"\nnet_id = \"10.0.0.7.3.1\"\n";
 
 #[test]
 fn subdevice_with_a_net_id_is_reached_by_it_and_by_the_command_line() {
@@ -268,9 +270,9 @@ fn subdevice_with_a_net_id_is_reached_by_it_and_by_the_command_line() {
         let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
         let listen = address.to_string();
         let options = ["--ads", &listen, "--ads-read-only"];
-        let plant = BRIDGE.split("[[device.start_up]]").next().unwrap();
+        let project = project_of(BRIDGE, BRIDGE_NET_ID);
         let options = &options[..2 + usize::from(read_only)];
-        let running = Running::with_files(plant, &[("project.toml", BRIDGE)], options);
+        let running = Running::with_files(BRIDGE, &[("project.toml", &project)], options);
         let mut client = Client::new(address);
         client.net_id = AmsNetId([10, 0, 0, 7, 3, 1]);
         assert_eq!(client.read(MAIN, index::SDO, object(0x1018, 1), 4), Ok(vec![2, 0, 0, 0]));
@@ -287,15 +289,15 @@ fn subdevice_with_a_net_id_is_reached_by_it_and_by_the_command_line() {
         client.net_id = AmsNetId([10, 0, 0, 7, 4, 1]);
         let (command, data) = AdsRequest::Read { group: 6, offset: 0, len: 2 }.to_bytes();
         assert_eq!(client.ask(MAIN, command, &data), (7, Vec::new()), "nobody's NetId");
-        assert_eq!(running.status()["devices"][1]["net_id"], "10.0.0.7.3.1");
+        running.until("tells its NetId", |report| report["devices"][1]["net_id"] == "10.0.0.7.3.1");
         let socket = running.socket();
-        let read = linesman(["aoe", &socket, "B1", "read", "0xF302", "0x10180001", "--json"]);
+        let read = linesman(["aoe", &socket, "2", "read", "0xF302", "0x10180001", "--json"]);
         assert_eq!(read.json()["data"], "02000000", "{}", read.all());
         crate::support::assert_valid(&read.json(), "ads");
         let refused = linesman([
             "aoe",
             &socket,
-            "B1",
+            "2",
             "read",
             "0x99",
             "0",

@@ -8,7 +8,9 @@ use std::process::Command as Program;
 use std::rc::Rc;
 use std::sync::mpsc::sync_channel;
 
+use crate::ads::{BRIDGE, BRIDGE_NET_ID};
 use crate::support::linesman;
+use crate::support::running::project_of;
 use linesman_diagnosis::HostObservation;
 use linesman_link::capture::{
     CaptureInterfaceId, CaptureReader, FrameToWrite, InterfaceToWrite, LinkType, PcapngWriter,
@@ -301,16 +303,11 @@ fn recorded_run_of_46_subdevices_is_surveyed_from_its_frames() {
     assert!(reached, "{states:?}");
 }
 
-/// A bridge that speaks AoE, which is given a NetId at start-up.
-const BRIDGE: &str = "\
-[[device]]\nname = \"K1\"\ntype = \"EK1100\"\non = \"maindevice\"\n\
-[[device]]\nname = \"B1\"\ntype = \"EL6692\"\non = \"K1.B\"\n\
-[[device.start_up]]\ntransition = \"IP\"\nnet_id = \"10.0.0.7.3.1\"\n";
-
 #[test]
 fn recorded_request_of_ads_and_its_answer_are_dissected_alike() {
     let folder = TempDir::new().unwrap();
-    let capture = record(folder.path(), BRIDGE);
+    let project = project_of(BRIDGE, BRIDGE_NET_ID);
+    let capture = record(folder.path(), &project);
     let fields = [
         "ams.targetnetid",
         "ams.targetport",

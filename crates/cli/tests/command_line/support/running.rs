@@ -18,6 +18,20 @@ pub(crate) const PLANT: &str = "\
 [[device]]\nname = \"T2\"\ntype = \"EL2008\"\non = \"K1.B\"\n\
 [[device]]\nname = \"T3\"\ntype = \"EL3104\"\non = \"T2.B\"\n";
 
+/// The project of a plant, as a scan saves it, with these lines for its last device.
+#[track_caller]
+pub(crate) fn project_of(plant: &str, lines: &str) -> String {
+    let folder = TempDir::new().unwrap();
+    let (segment, project) = (folder.path().join("line.toml"), folder.path().join("project.toml"));
+    std::fs::write(&segment, plant).unwrap();
+    let on = format!("sim:{}", segment.display());
+    let saved = linesman(["scan", &on, "--save", project.to_str().unwrap()]);
+    assert_eq!(saved.status, 0, "{}", saved.all());
+    let text = std::fs::read_to_string(&project).unwrap();
+    let at = text.rfind("[device.description]").unwrap();
+    format!("{}{lines}\n{}", &text[..at], &text[at..])
+}
+
 /// Ended with the test.
 pub(crate) struct Running {
     child: Child,
