@@ -89,6 +89,8 @@ pub struct DeviceProfile {
     pub clock_modes: Vec<ClockMode>,
     /// What it needs for its work in a cycle, as far as its dictionary says; an SII says nothing.
     pub sync_times: SyncTimes,
+    /// Number of drive channels that its description states: of SoE, or of CiA 402. 0: it states none.
+    pub drive_channels: u8,
 }
 
 /// An operation mode with distributed clocks (SII category 60; ESI `Dc/OpMode`).
@@ -191,6 +193,8 @@ impl DeviceProfile {
             identification: general
                 .map_or(Identification::None, linesman_proto::sii::General::identification),
             sync_times: SyncTimes::default(),
+            drive_channels: general
+                .map_or(0, |general| general.soe_channels.max(general.ds402_channels)),
         }
     }
 

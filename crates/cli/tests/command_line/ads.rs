@@ -179,6 +179,11 @@ fn what_is_seen_online_is_read_and_written_by_ads() {
     assert_eq!(client.result(MAIN, &AdsRequest::State), (0, vec![5, 0, 8, 0]));
     let counts = running.status()["ads"].clone();
     assert_eq!(counts["net_id"], "127.0.0.1.2.1");
+    // The address by which this SubDevice was asked stands in its information.
+    let devices = running.status()["devices"].clone();
+    let mut stations = devices.as_array().unwrap().iter().filter(|one| one["station"] == STEPPER);
+    let info = &stations.next().unwrap()["info"];
+    assert_eq!(info["ads_address"], format!("127.0.0.1.2.1:{STEPPER}"), "{info}");
     assert_eq!(counts["requests"], counts["answers"], "{counts}");
     let expected = serde_json::json!({
         "0x700 general device error": 1, "0x701 service not supported": 1, "0x70C not found": 1,

@@ -15,7 +15,7 @@ fn number(value: &Value) -> u64 {
     value.as_u64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
-// proves: PLC-03 partial: while all is right, PLC-09 partial: no channels, no shift of the clock, no number of an object, PLC-10
+// proves: PLC-03 partial: while all is right, PLC-09 partial: without clocks, PLC-10
 // partial: no groups that come and go
 #[test]
 fn a_running_line_is_shown_with_all_that_is_known() {
@@ -44,6 +44,9 @@ fn a_running_line_is_shown_with_all_that_is_known() {
         (&device["abnormal_changes"], &device["presence_changes"]),
         (&Value::from(0), &Value::from(1))
     );
+    let info = &device["info"];
+    assert_eq!((number(&info["object"]), &info["channels"]), (0x8001, &serde_json::json!([])));
+    assert!(info["ads_address"].is_null() && info["output_shift_ns"].is_null(), "{info}");
     let mailbox = &report["devices"][2]["mailbox"];
     assert!(number(&mailbox["out_size"]) > 0, "{mailbox}");
     assert!(report["devices"][0]["mailbox"].is_null());
@@ -56,7 +59,9 @@ fn a_running_line_is_shown_with_all_that_is_known() {
         assert!(table.stdout.contains(words), "{words}: {}", table.stdout);
     }
     let one = linesman(["online", "--control", &running.socket(), "3"]);
-    assert!(one.stdout.contains("2 port B") && one.stdout.contains("product 0x"), "{}", one.all());
+    for words in ["2 port B", "product 0x", "object 0x8002 of the MainDevice"] {
+        assert!(one.stdout.contains(words), "{words}: {}", one.all());
+    }
     assert_eq!(linesman(["online", &running.socket(), "T9"]).status, 2);
 }
 

@@ -180,6 +180,7 @@ fn general(device: &EsiDevice, strings: &mut Strings) -> General {
         foe: u8::from(mailbox.protocols.has(Protocols::FOE)),
         eoe: u8::from(mailbox.protocols.has(Protocols::EOE)),
         soe_channels: mailbox.soe_channels,
+        ds402_channels: mailbox.ds402_channels,
         flags: GeneralFlags(flags),
         ebus_current_ma: device.ebus_current_ma.unwrap_or(0),
         ports: device.ports,

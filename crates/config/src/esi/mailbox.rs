@@ -18,6 +18,8 @@ pub struct EsiMailbox {
     pub data_link_layer: bool,
     /// Number of SoE channels.
     pub soe_channels: u8,
+    /// Number of CiA 402 channels; 0 where nothing is said.
+    pub ds402_channels: u8,
     /// What a MainDevice is to write when it starts the device.
     pub commands: Vec<InitCommand>,
     /// The same by other protocols.
@@ -62,6 +64,7 @@ pub(super) fn mailbox(element: &Element) -> Result<EsiMailbox, EsiError> {
     }
     if let Some(coe) = element.child("CoE") {
         mailbox.coe = details(coe)?;
+        mailbox.ds402_channels = coe.attribute_number("DS402Channels")?.unwrap_or(0);
         for command in coe.children("InitCmd") {
             mailbox.commands.push(init_command(command).map_err(|error| error.within("CoE"))?);
         }

@@ -12,6 +12,7 @@ pub mod ethernet;
 mod exchange;
 pub mod expect;
 mod hot_connect;
+mod info_data;
 pub mod layout;
 pub mod lint;
 pub mod reference;
@@ -45,6 +46,7 @@ pub use cycle::CycleError;
 pub use exchange::{PlannedCounter, PlannedExchange};
 pub use expect::{PathView, Presence, Served};
 pub use hot_connect::{HotConnectGroup, IdentificationCheck, IdentificationSource};
+pub use info_data::{InfoData, configuration_object};
 pub use layout::{PlanError, PlanOptions};
 pub use lint::{Doubt, Severity};
 pub use settings::{
@@ -165,6 +167,8 @@ pub struct DevicePlan {
     pub ports: Option<PortMap<PortKind>>,
     /// What it needs for its work in a cycle, as far as that is known.
     pub sync_times: SyncTimes,
+    /// Numbers of its drive channels, from 0; empty for all but drives.
+    pub channels: Vec<u8>,
 }
 
 impl DevicePlan {
@@ -192,6 +196,7 @@ impl DevicePlan {
             ebus_current_ma: None,
             ports: None,
             sync_times: SyncTimes::default(),
+            channels: Vec::new(),
         }
     }
 

@@ -91,7 +91,9 @@ impl Multiplexer {
             repetitions: 0,
             last_frame: None,
             fragments: UnansweredFragments::default(),
-            net_id: device.net_id().unwrap_or(AmsNetId::of_sub_device(device.station)),
+            net_id: device
+                .net_id()
+                .unwrap_or(AmsNetId::of_main_device([127, 0, 0, 1]).of_sub_device(device.station)),
             invoke_id: 0,
         })
     }

@@ -22,12 +22,13 @@ impl AmsNetId {
         Self([a, b, c, d, 2, 1])
     }
 
-    /// NetId of the SubDevice with this station address where no plan gives it one: 127.0.0.1, then the address, high
-    /// byte first. A NetId is chosen freely, and is to be unique.
+    /// NetId of the SubDevice with this station address in the network that has this NetId, where no plan gives it one: the
+    /// station address, high byte first, in place of the last two bytes. A NetId is chosen freely, and is to be unique.
     #[must_use]
-    pub const fn of_sub_device(station: StationAddress) -> Self {
+    pub const fn of_sub_device(self, station: StationAddress) -> Self {
+        let [a, b, c, d, ..] = self.0;
         let [high, low] = station.value().to_be_bytes();
-        Self([127, 0, 0, 1, high, low])
+        Self([a, b, c, d, high, low])
     }
 }
 
@@ -99,7 +100,8 @@ mod tests {
         let net_id: AmsNetId = "169.254.215.231.2.1".parse().unwrap();
         assert_eq!(net_id, AmsNetId::of_main_device([169, 254, 215, 231]));
         assert_eq!(net_id.to_string(), "169.254.215.231.2.1");
-        let of_sub_device = AmsNetId::of_sub_device(StationAddress(0x1004));
+        let of_sub_device =
+            AmsNetId::of_main_device([127, 0, 0, 1]).of_sub_device(StationAddress(0x1004));
         assert_eq!(of_sub_device.to_string(), "127.0.0.1.16.4");
         for wrong in [
             "",

@@ -45,6 +45,11 @@ impl AdsWatch {
     pub(crate) fn report(&self) -> AdsReport {
         self.0.report()
     }
+
+    /// NetId of the MainDevice.
+    pub(crate) fn net_id(&self) -> AmsNetId {
+        self.0.net_id
+    }
 }
 
 impl std::fmt::Debug for AdsWatch {

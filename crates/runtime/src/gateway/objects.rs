@@ -4,6 +4,7 @@
 //! (configuration), 0x9000 + n (what was found; only while it is there) and 0xA000 + n (state and counters). Only what
 //! this program knows has an entry; entries in between that it does not know are left out.
 
+use linesman_config::plan::configuration_object;
 use linesman_proto::mailbox::coe::information::ObjectCode;
 use linesman_proto::mailbox::coe::{DataType, ObjectIndex};
 use linesman_proto::state::AlState;
@@ -34,7 +35,8 @@ pub(super) fn dictionary(report: &OnlineReport, commands: &ObjectCommands) -> Di
     objects.extend(commands.objects());
     let devices = report.devices.get(..MOST).unwrap_or(&report.devices);
     for (device, number) in devices.iter().zip(0..) {
-        objects.push(configuration(0x8000 + number, device));
+        objects
+            .extend(configuration_object(number.into()).map(|index| configuration(index, device)));
         if let (Some(found), Some(true)) = (&device.found, device.present) {
             objects.push(information(0x9000 + number, device, found));
         }

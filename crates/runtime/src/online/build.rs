@@ -1,9 +1,10 @@
 //! A report made of what is planned, what has happened and how it is now.
 
-use linesman_config::plan::{DevicePlan, Plan};
+use linesman_config::plan::{DevicePlan, InfoData, Plan};
 use linesman_maindevice::watch::{CounterTotals, GroupStatus, NetworkStatus, WatchedDevice};
 use linesman_maindevice::{FrameStatus, Statistics};
 use linesman_proto::address::{DeviceId, Position};
+use linesman_proto::ads::AmsNetId;
 use linesman_proto::port::Port;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::sii::Identity;
@@ -13,17 +14,18 @@ use linesman_proto::topology::End;
 
 use super::report::{
     Count, FrameCounts, MailboxTrouble, Neighbour, OddFrames, OnlineChange, OnlineClock,
-    OnlineDevice, OnlineFrame, OnlineGroup, OnlineIdentity, OnlineMailbox, OnlinePort,
+    OnlineDevice, OnlineFrame, OnlineGroup, OnlineIdentity, OnlineInfo, OnlineMailbox, OnlinePort,
     OnlineReport, OnlineSyncUnit, SCHEMA, Word,
 };
 use super::snapshot::Snapshot;
 
-/// A line that is driven; counts of frames begin at `base`.
+/// A line that is driven; counts of frames begin at `base`, and programs reach it by `net_id`.
 pub(super) fn driven(
     plan: &Plan,
     status: &NetworkStatus,
     snapshot: &Snapshot,
     base: &Statistics,
+    net_id: Option<AmsNetId>,
 ) -> OnlineReport {
     let mut report = known(plan, status, snapshot.now);
     report.driven = true;
@@ -31,6 +33,7 @@ pub(super) fn driven(
     report.responding_by_card = snapshot.responding_by_card.map(|both| both.map(|count| count.0));
     for (device, planned) in report.devices.iter_mut().zip(&plan.devices) {
         add_data(device, planned, snapshot);
+        device.info = Some(info(plan.info_data(planned, net_id)));
     }
     frames(&mut report, plan, snapshot);
     let counts = &snapshot.statistics;
@@ -222,6 +225,18 @@ fn add_data(device: &mut OnlineDevice, planned: &DevicePlan, snapshot: &Snapshot
             })
             .collect(),
     });
+}
+
+fn info(of: InfoData) -> OnlineInfo {
+    OnlineInfo {
+        ads_address: of.ads_address.map(|address| address.to_string()),
+        aoe_net_id: of.aoe_net_id.map(|net_id| net_id.to_string()),
+        channels: of.channels,
+        sync0_shift_ns: of.sync0_shift_ns,
+        output_shift_ns: of.output_shift.map(Span::as_nanos),
+        input_shift_ns: of.input_shift.map(Span::as_nanos),
+        object: of.object,
+    }
 }
 
 fn frames(report: &mut OnlineReport, plan: &Plan, snapshot: &Snapshot) {

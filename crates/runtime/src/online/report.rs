@@ -181,6 +181,33 @@ pub struct OnlineDevice {
     /// Its NetId, by which ADS reaches it (AoE); `null`: its configuration names none.
     #[serde(default)]
     pub net_id: Option<String>,
+    /// Addresses, drive channels and times for programs; `null`: nobody drives the line.
+    #[serde(default)]
+    pub info: Option<OnlineInfo>,
+}
+
+/// Information of a SubDevice for programs, beside its state.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct OnlineInfo {
+    /// Its address by ADS, NetId and port: `192.168.1.5.2.1:4098`; `null`: no ADS server is open.
+    pub ads_address: Option<String>,
+    /// NetId for AoE: the one of its configuration (`net_id`), else that of the network with the station address in place
+    /// of the last two bytes; `null`: it does not speak AoE, or no ADS server is open.
+    pub aoe_net_id: Option<String>,
+    /// Numbers of its drive channels, from 0; empty for all but drives.
+    pub channels: Vec<u8>,
+    /// Planned shift of SYNC0 against the begin of the cycle, in ns; `null`: it has no SYNC0.
+    pub sync0_shift_ns: Option<i64>,
+    /// From the begin of the cycle, when its outputs leave, to the SYNC0 that makes them effective, in ns; `null`: it
+    /// has no SYNC0, or no outputs.
+    pub output_shift_ns: Option<u64>,
+    /// From the SYNC0 that takes its inputs to the begin of the cycle that fetches them, in ns; `null`: it has no SYNC0,
+    /// or no inputs.
+    pub input_shift_ns: Option<u64>,
+    /// Index of its object in the dictionary of the MainDevice (ETG.1510), from 32768 (0x8000) on; `null`: it has none.
+    pub object: Option<u16>,
 }
 
 /// Who a SubDevice is.

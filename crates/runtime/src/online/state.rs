@@ -166,7 +166,13 @@ impl OnlineState {
             inner.watch.iter_mut().for_each(|watch| watch.handle_send_failure(false));
         }
         let watch = inner.watch.as_ref()?;
-        let mut report = build::driven(watch.plan(), watch.network_status(), snapshot, &inner.base);
+        let mut report = build::driven(
+            watch.plan(),
+            watch.network_status(),
+            snapshot,
+            &inner.base,
+            inner.ads.as_ref().map(AdsWatch::net_id),
+        );
         report.on.clone_from(&inner.on);
         report.cards.clone_from(&inner.cards);
         let ethernet = inner.ethernet.as_ref().map(EthernetWatch::report);

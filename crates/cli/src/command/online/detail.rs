@@ -1,6 +1,8 @@
 //! One SubDevice with all that is known of it.
 
-use linesman_runtime::online::report::{Count, OnlineDevice, OnlineIdentity, OnlineReport};
+use linesman_runtime::online::report::{
+    Count, OnlineDevice, OnlineIdentity, OnlineInfo, OnlineReport,
+};
 
 use linesman_config::inventory::label;
 use linesman_proto::address::DeviceId;
@@ -54,6 +56,7 @@ pub(super) fn text(report: &OnlineReport, device: &OnlineDevice, output: &Output
         let age = device.age_ns.map(|age| format!(", inputs {} old", time(age)));
         text.push_str(&format!("  working counter {is}{}\n", age.unwrap_or_default()));
     }
+    text.push_str(&device.info.as_ref().map(info).unwrap_or_default());
     text.push('\n');
     text.push_str(&ports(device, output));
     for (what, counter) in
@@ -87,6 +90,24 @@ pub(super) fn text(report: &OnlineReport, device: &OnlineDevice, output: &Output
         }
     }
     text
+}
+
+/// What programs need of it.
+fn info(of: &OnlineInfo) -> String {
+    let channels = of.channels.iter().map(u8::to_string).collect::<Vec<_>>();
+    let lines = [
+        of.ads_address.as_ref().map(|address| format!("ADS address {address}")),
+        of.aoe_net_id.as_ref().map(|net_id| format!("NetId for AoE {net_id}")),
+        (!channels.is_empty()).then(|| format!("drive channels {}", channels.join(", "))),
+        of.output_shift_ns.map(|shift| {
+            format!("outputs take effect {} after the cycle begins (SYNC0)", time(shift))
+        }),
+        of.input_shift_ns.map(|shift| {
+            format!("inputs are taken {} before the cycle that fetches them (SYNC0)", time(shift))
+        }),
+        of.object.map(|object| format!("object 0x{object:04X} of the MainDevice")),
+    ];
+    lines.into_iter().flatten().map(|line| format!("  {line}\n")).collect()
 }
 
 fn times(number: u64) -> String {

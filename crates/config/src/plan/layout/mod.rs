@@ -266,6 +266,7 @@ fn device(planned: &PlannedDevice, id: u32) -> DevicePlan {
         ebus_current_ma: planned.profile.ebus_current_ma,
         ports: planned.profile.ports,
         sync_times: planned.profile.sync_times,
+        channels: super::info_data::drive_channels(&planned.profile),
         ..DevicePlan::bare(DeviceId(id))
     }
 }
