@@ -302,7 +302,7 @@ fn waits_for_programs() -> impl Fn(&[u8]) -> Span {
 }
 
 // S0 L656-688.
-// proves: SYN-28 (S) partial: the first rule; the second is proven by the calculation
+// proves: SYN-28 (S)
 #[test]
 fn of_three_tasks_the_verdict_by_the_last_frame_agrees_with_what_the_subdevices_count() {
     let mut times = measured();
@@ -353,6 +353,84 @@ fn of_three_tasks_the_verdict_by_the_last_frame_agrees_with_what_the_subdevices_
             }
         }
     }
+}
+
+/// How many whole cycles pass at the most until inputs of I1 that were set in the middle of a cycle are there, over some
+/// cycles in which programs take their longest or nothing; `None` when I1 is not in OP afterwards.
+fn cycles_until_inputs_are_there(bench: &mut Bench, plan: &Plan) -> Option<u64> {
+    let id = bench.id("I1");
+    let signal = bench.segment.inputs(id)[0];
+    let range = plan.devices[id.index()].inputs.clone();
+    let middle = SLOW.as_nanos() as i64 / 2;
+    let mut most = 0;
+    for round in 1..=6_u32 {
+        // Rounds begin in each of the three cycles in turn.
+        bench.run_for(SLOW * u64::from(round));
+        let to_middle = (middle - phase(bench, plan, SLOW)).rem_euclid(2 * middle);
+        bench.run_for(Span::ns(to_middle.unsigned_abs()));
+        bench.segment.signals_mut().set(signal, round as i32 * 1_000);
+        let (set, before) = (bench.now, bench.device.inputs()[range.clone()].to_vec());
+        let mut left = 200;
+        while bench.device.inputs()[range.clone()] == before[..] {
+            left -= 1;
+            assert!(left > 0, "the inputs do not change");
+            bench.run_for(Span::us(50));
+        }
+        most = most.max(bench.now.since(set).as_nanos() / SLOW.as_nanos());
+    }
+    (bench.state("I1") == "OP").then_some(most)
+}
+
+// S0 L656-688: the second rule by the first relevant frame; the first rule is proven by the test above. SYNC0 of I1, which has inputs only, comes so long before
+// the next cycle; calculating and copying take 12 µs from there.
+// proves: SYN-28 (S)
+#[test]
+fn of_three_tasks_inputs_are_a_cycle_older_where_the_plan_fails_the_second_rule_alone() {
+    let mut times = measured();
+    let both = times[1].outputs;
+    times.push(SyncTimes { outputs: both, inputs: both });
+    let execution = TASKS.map(|(name, us)| (name.to_owned(), Span::us(us))).to_vec();
+    let options = TimingOptions {
+        execution,
+        jitter: Some(Span::ZERO),
+        task_jitter: Some(Span::ZERO),
+        cable_m: Some(0),
+        ..TimingOptions::default()
+    };
+    let mut compared = [0; 3];
+    for before_us in [100, 40, 20, 16, 14, 10, 8, 6, 4, 3, 2, 1] {
+        let mut bench = Bench::new(THREE_TASKS);
+        let mut plan = three_tasks(&mut bench, &times);
+        plan.inputs_shift_ns = Some(-before_us * 1_000);
+        let timing = plan.timing(&options);
+        let device = timing.devices.iter().find(|one| one.device == DeviceId(2)).expect("I1");
+        let case = format!("{before_us} µs before the cycle: {device:#?}");
+        assert_eq!(device.after_frames.verdict, TimingVerdict::Pass, "{case}");
+        let margin = device.before_next.margin_ns.expect("a margin");
+        assert_eq!(device.before_next.frame, Some(0), "the first frame decides: {case}");
+        // The frame that fetches them follows the first one at once when no program takes any time.
+        let later = plan.tasks[0].frames[0].wire_time().as_nanos() as i64;
+        assert!((1..12_000).contains(&later), "{later} ns: {case}");
+
+        bench.leaves_after = Some(Box::new(waits_for_programs()));
+        bench.device.start(bench.now, plan.clone());
+        bench.run_for(Span::s(8));
+        let found = cycles_until_inputs_are_there(&mut bench, &plan);
+        let found = found.unwrap_or_else(|| panic!("I1 left OP: {case}"));
+        let verdict = if margin >= 0 { TimingVerdict::Pass } else { TimingVerdict::Fail };
+        assert_eq!(device.verdict, verdict, "{case}");
+        // Clock, servo and wire are known to some 100 ns.
+        match margin + later {
+            left if left > 800 => assert_eq!(found, 0, "they come with the next frame: {case}"),
+            left if left < -800 => assert_eq!(found, 1, "a cycle older: {case}"),
+            _ => continue,
+        }
+        // By the first frame the plan fails a little sooner than inputs are old, and never later.
+        assert!(verdict == TimingVerdict::Fail || found == 0, "{case}");
+        compared[usize::from(verdict == TimingVerdict::Fail) + found as usize] += 1;
+    }
+    let [pass, sooner, old] = compared;
+    assert!(pass >= 5 && sooner >= 2 && old >= 4, "{compared:?}");
 }
 
 /// Time within the cycle by the reference clock, in ns.

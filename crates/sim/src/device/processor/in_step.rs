@@ -9,6 +9,7 @@ use super::synchronisation::Flow;
 use super::{Processor, RequestedStep, StepOutcome};
 use crate::controller::{Pdi, SyncSignal};
 use crate::device::application_layer::ApplicationLayer;
+use crate::device::software_fault::SoftwareFault;
 
 impl Processor {
     /// Whether a SyncManager of a direction says that the MainDevice has been there. One that gives
@@ -38,12 +39,48 @@ impl Processor {
         if operational && self.synchronisation.is_silent(now) {
             self.fall(pdi, AlState::SafeOp, AlStatusCode::FATAL_SYNC_ERROR);
         }
-        let (drive, sample) = self.synchronisation.take_due(now);
-        if drive && operational {
+        let due = self.synchronisation.take_due(now);
+        if due.drive && operational {
             self.drive_outputs(now, pdi.signals_mut());
         }
-        if sample && ApplicationLayer::state(pdi).has_inputs() {
-            self.sample_inputs(now, pdi);
+        let has_inputs = ApplicationLayer::state(pdi).has_inputs();
+        if due.latch && has_inputs {
+            self.latch_inputs(now, pdi);
+        }
+        if due.give && has_inputs {
+            // Whoever has fetched the inputs of the cycle before since the signal has come in this cycle.
+            self.fetched_early |= self.was_visited(Direction::Inputs, pdi);
+            self.give_inputs(pdi);
+        }
+    }
+
+    /// Takes inputs and puts them where frames fetch them.
+    pub(super) fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        self.latch_inputs(now, pdi);
+        self.give_inputs(pdi);
+    }
+
+    fn latch_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
+        self.next_sample = now + self.description.times.sample;
+        let time = pdi.system_time();
+        if !self.software_faults.has(SoftwareFault::FrozenApplication) {
+            self.has_values = true;
+            for channel in &mut self.description.channels {
+                channel.tell_time(time);
+                channel.sample(now, &mut self.dictionary, pdi.signals());
+            }
+        }
+        self.hear_channels();
+    }
+
+    fn give_inputs(&mut self, pdi: &mut Pdi<'_>) {
+        self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
+    }
+
+    /// Begins to write the inputs of this cycle, which takes the events of those of the last one back.
+    fn open_inputs(&self, pdi: &mut Pdi<'_>) {
+        for (index, _) in self.process_data.lengths(Direction::Inputs).filter(|(_, len)| *len > 0) {
+            pdi.open_sync_manager(index, false);
         }
     }
 
@@ -61,11 +98,15 @@ impl Processor {
         }
         let flow = Flow {
             outputs: self.has_outputs(),
-            inputs_fetched: self.was_visited(Direction::Inputs, pdi),
+            inputs_fetched: self.fetched_early || self.was_visited(Direction::Inputs, pdi),
             operational: state == AlState::Op,
         };
         if let Some(code) = self.synchronisation.pulse(now, &mut self.dictionary, flow) {
             self.fall(pdi, AlState::SafeOp, code);
+        }
+        if self.synchronisation.will_latch() {
+            self.fetched_early = false;
+            self.open_inputs(pdi);
         }
         self.serve_due(now, pdi);
         if self.step.is_some_and(|step| step.due <= now) {

@@ -10,6 +10,7 @@ mod in_step;
 mod mismatch;
 mod note;
 mod process_image;
+mod sync_mode;
 mod synchronisation;
 mod update;
 
@@ -125,6 +126,8 @@ pub struct Processor {
     software_faults: SoftwareFaults,
     /// Its application has run since it started: there are values.
     has_values: bool,
+    /// Inputs were fetched between the last signal of its clock and the end of copying new ones.
+    fetched_early: bool,
     /// It reads its SII itself on the way to PREOP.
     reads_sii: bool,
     /// It has locked all buffers of its process data.
@@ -169,6 +172,7 @@ impl Processor {
             history: History::default(),
             software_faults: SoftwareFaults::default(),
             has_values: false,
+            fetched_early: false,
             reads_sii: false,
             has_locked: false,
             former: Vec::new(),
@@ -454,20 +458,6 @@ impl Processor {
             self.serve_outputs(now, pdi);
         }
         self.serve_due(now, pdi);
-    }
-
-    fn sample_inputs(&mut self, now: Instant, pdi: &mut Pdi<'_>) {
-        self.next_sample = now + self.description.times.sample;
-        let time = pdi.system_time();
-        if !self.software_faults.has(SoftwareFault::FrozenApplication) {
-            self.has_values = true;
-            for channel in &mut self.description.channels {
-                channel.tell_time(time);
-                channel.sample(now, &mut self.dictionary, pdi.signals());
-            }
-        }
-        self.hear_channels();
-        self.process_data.put_inputs(pdi, &self.dictionary, &mut self.buffer);
     }
 
     /// Whether the outputs are watched and came too late.

@@ -6,6 +6,10 @@
 //! did not come before their SYNC (0B), work that was not done before the next (0C), outputs that
 //! came too shortly before (0D); 20 shows that the last cycle was one of those.
 //!
+//! In step with a clock, inputs are latched at the signal (and 03 of 0x1C33 after it) and can be fetched when they are
+//! calculated and copied (06 of 0x1C33): a frame that passes in between fetches those of the cycle before, without any
+//! error. Where 06 says nothing they can be fetched at once.
+//!
 //! An edge that follows the last one within a quarter of the cycle is none of the SYNC unit: the line
 //! to the processor is disturbed. Such an edge starts no work; it weighs like a miss.
 //!
@@ -16,6 +20,7 @@ use linesman_proto::mailbox::coe::{ObjectAddress, ObjectIndex};
 use linesman_proto::state::AlStatusCode;
 use linesman_proto::time::{Instant, Span};
 
+use super::sync_mode::{SyncMode, mode};
 use crate::controller::{Pdi, SyncSignal};
 use crate::device::dictionary::Dictionary;
 
@@ -54,22 +59,8 @@ mod sub {
     pub(super) const SYNC_ERROR: u8 = 0x20;
 }
 
-/// Bits of subindex 04.
-const FREE_RUN: u64 = 1 << 0;
-const WITH_FRAMES: u64 = 1 << 1;
-const WITH_CLOCK: u64 = 0b111 << 2;
+/// Bit of subindex 04: times are measured on demand.
 const MEASURES: u64 = 1 << 14;
-
-/// What the device keeps step with.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum SyncMode {
-    /// Its own timer.
-    FreeRun,
-    /// The frames that bring outputs or fetch inputs.
-    Frames,
-    /// A signal of its clock.
-    Clock(SyncSignal),
-}
 
 /// What a type needs for its work, in ns.
 #[derive(Clone, Copy, Default, Debug)]
@@ -78,6 +69,8 @@ struct SyncNeeds {
     cycle: u64,
     /// For getting outputs ready.
     calc_and_copy: u64,
+    /// From the latch of the inputs to where they can be fetched.
+    input_copy: u64,
     /// From there to the terminal.
     delay: u64,
 }
@@ -120,7 +113,20 @@ pub(super) struct Synchronisation {
     /// How long its work takes instead of what it needs: a fault.
     takes: Option<Span>,
     drive_at: Option<Instant>,
-    sample_at: Option<Instant>,
+    latch_at: Option<Instant>,
+    /// When what was latched can be fetched.
+    give_at: Option<Instant>,
+}
+
+/// What is due.
+#[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
+pub(super) struct DueWork {
+    /// Outputs are driven.
+    pub(super) drive: bool,
+    /// Inputs are latched.
+    pub(super) latch: bool,
+    /// Latched inputs are put where frames fetch them.
+    pub(super) give: bool,
 }
 
 fn get(dictionary: &Dictionary, index: u16, subindex: u8) -> u64 {
@@ -157,6 +163,7 @@ impl Synchronisation {
         let needs = SyncNeeds {
             cycle: most(sub::SHORTEST_CYCLE),
             calc_and_copy: most(sub::CALC_AND_COPY),
+            input_copy: get(fresh, INPUTS, sub::CALC_AND_COPY).min(1_000_000_000),
             delay: most(sub::DELAY),
         };
         Self {
@@ -175,7 +182,8 @@ impl Synchronisation {
             strays: 0,
             takes: None,
             drive_at: None,
-            sample_at: None,
+            latch_at: None,
+            give_at: None,
         }
     }
 
@@ -385,7 +393,7 @@ impl Synchronisation {
             let shift = |index| Span::ns(get(dictionary, index, sub::SHIFT).min(cycle));
             let driven = now + shift(OUTPUTS) + Span::ns(self.needs.delay);
             self.drive_at = (arrived.is_some() && flow.operational).then_some(driven);
-            self.sample_at = Some(now + shift(INPUTS));
+            self.latch_at = Some(now + shift(INPUTS));
         }
         for index in [OUTPUTS, INPUTS] {
             put(dictionary, index, sub::SYNC_ERROR, u64::from(missed));
@@ -423,14 +431,23 @@ impl Synchronisation {
         }
     }
 
-    /// What is due at `now`: outputs to drive, inputs to sample.
-    pub(super) fn take_due(&mut self, now: Instant) -> (bool, bool) {
-        let take = |at: &mut Option<Instant>| at.take_if(|at| *at <= now).is_some();
-        let drive = take(&mut self.drive_at);
+    /// True if the last signal was heard, and inputs are to be latched because of it.
+    pub(super) fn will_latch(&self) -> bool {
+        self.latch_at.is_some()
+    }
+
+    /// What is due at `now`.
+    pub(super) fn take_due(&mut self, now: Instant) -> DueWork {
+        let take = |at: &mut Option<Instant>| at.take_if(|at| *at <= now);
+        let drive = take(&mut self.drive_at).is_some();
         if drive && self.mode == SyncMode::Frames {
             self.busy_until = now + self.takes();
         }
-        (drive, take(&mut self.sample_at))
+        let latched = take(&mut self.latch_at);
+        if let Some(latched) = latched {
+            self.give_at = Some(latched + Span::ns(self.needs.input_copy));
+        }
+        DueWork { drive, latch: latched.is_some(), give: take(&mut self.give_at).is_some() }
     }
 
     /// Whether the clock has fallen silent while the device was in OP.
@@ -447,66 +464,6 @@ impl Synchronisation {
     /// When something is due next.
     pub(super) fn next(&self, operational: bool) -> Option<Instant> {
         let silent = self.silent_at().filter(|_| operational);
-        [self.drive_at, self.sample_at, silent].into_iter().flatten().min()
-    }
-}
-
-/// The mode that follows from what is wanted (0x1C3x:01), supported (04) and switched on (0x0981).
-fn mode(wanted: u64, supported: u64, activation: u8) -> Result<SyncMode, AlStatusCode> {
-    const UNIT: u8 = 1 << 0;
-    const SYNC0: u8 = 1 << 1;
-    const SYNC1: u8 = 1 << 2;
-    const WANTS_SYNC1: u64 = 3;
-    if activation & UNIT != 0 {
-        let clock = supported & WITH_CLOCK != 0;
-        if !clock || activation & SYNC0 == 0 {
-            return Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION);
-        }
-        return match (wanted, activation & SYNC1 != 0) {
-            (WANTS_SYNC1, true) => Ok(SyncMode::Clock(SyncSignal::Sync1)),
-            (WANTS_SYNC1, false) => Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION),
-            _ => Ok(SyncMode::Clock(SyncSignal::Sync0)),
-        };
-    }
-    match wanted {
-        0 if supported & FREE_RUN == 0 => Err(AlStatusCode::FREE_RUN_NOT_SUPPORTED),
-        0 => Ok(SyncMode::FreeRun),
-        1 | 0x22 if supported & WITH_FRAMES == 0 => Err(AlStatusCode::SYNC_NOT_SUPPORTED),
-        1 | 0x22 => Ok(SyncMode::Frames),
-        2 | 3 => Err(AlStatusCode::INVALID_DC_SYNC_CONFIGURATION),
-        _ => Err(AlStatusCode::SYNC_NOT_SUPPORTED),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    // proves: SYN-01 (U)
-    #[test]
-    fn the_mode_follows_from_objects_and_unit() {
-        let all = FREE_RUN | WITH_FRAMES | WITH_CLOCK;
-        let sync0 = SyncMode::Clock(SyncSignal::Sync0);
-        // wanted, supported, activation, mode or code
-        let table = [
-            (0, all, 0x00, Ok(SyncMode::FreeRun)),
-            (1, all, 0x00, Ok(SyncMode::Frames)),
-            (0x22, all, 0x00, Ok(SyncMode::Frames)),
-            (1, all, 0x03, Ok(sync0)),
-            (2, all, 0x03, Ok(sync0)),
-            (3, all, 0x07, Ok(SyncMode::Clock(SyncSignal::Sync1))),
-            (2, all, 0x00, Err(0x0030)),
-            (3, all, 0x03, Err(0x0030)),
-            (1, all, 0x01, Err(0x0030)),
-            (1, all, 0x05, Err(0x0030)),
-            (1, FREE_RUN | WITH_FRAMES, 0x03, Err(0x0030)),
-            (0, WITH_FRAMES, 0x00, Err(0x0027)),
-            (1, FREE_RUN, 0x00, Err(0x0028)),
-            (9, all, 0x00, Err(0x0028)),
-        ];
-        for (wanted, supported, activation, expected) in table {
-            let found = mode(wanted, supported, activation).map_err(|code| code.0);
-            assert_eq!(found, expected, "{wanted} of {supported:04X}, 0x0981 {activation:02X}");
-        }
+        [self.drive_at, self.latch_at, self.give_at, silent].into_iter().flatten().min()
     }
 }

@@ -190,6 +190,50 @@ fn outputs_that_do_not_come_are_counted_and_end_in_safeop() {
     assert_eq!(outputs.request_op(700), (8, 0));
 }
 
+/// True if a frame `phase` µs behind SYNC0 fetches what was set before that SYNC0.
+fn fetches_new_inputs(inputs: &mut InStep, phase: u64, value: i32) -> bool {
+    let signal = inputs.device.built.inputs[0];
+    inputs.wait_for(900);
+    inputs.device.bench.signals.set(signal, value);
+    inputs.wait_for(phase);
+    let fetched = inputs.device.exchange(&[]).0;
+    fetched.windows(2).any(|word| word == (value as u16).to_le_bytes())
+}
+
+// 0x1C33:06 is 12 µs, which the type states; ETG.1020: from the latch to where the frame can fetch them.
+#[test]
+fn inputs_can_be_fetched_when_they_are_copied_and_those_of_the_cycle_before_until_then() {
+    for (latch_us, phase, expected) in
+        [(0, 5, false), (0, 11, false), (0, 13, true), (100, 111, false), (100, 113, true)]
+    {
+        let mut inputs = InStep::new("EL3102");
+        let shift = (latch_us * 1_000_u32).to_le_bytes();
+        assert_eq!(inputs.device.download(0x1C33, 3, &shift), Ok(()));
+        inputs.start_sync(CYCLE, 0, 0x03);
+        inputs.device.enter_safeop();
+        assert_eq!(inputs.request_op(700), (8, 0));
+        for value in [0x1111, 0x2222, 0x3333] {
+            let new = fetches_new_inputs(&mut inputs, phase, value);
+            assert_eq!(new, expected, "latch {latch_us} µs, frame at {phase} µs, {value:04X}");
+        }
+        // A frame that always comes in between fetches what is a cycle older, and nobody counts an error.
+        inputs.run(200, phase);
+        assert_eq!(inputs.device.status(), (8, 0), "{latch_us} {phase}");
+        assert_eq!(inputs.shown(EVENT_MISSED), 0, "{latch_us} {phase}");
+    }
+}
+
+#[test]
+fn frames_that_do_not_come_are_missed_also_where_they_came_before_the_inputs_were_copied() {
+    let mut inputs = InStep::up("EL3102");
+    inputs.run(50, 5);
+    // The frame of this cycle was there before the next SYNC0, and none before that after it.
+    for _ in 0..3 {
+        inputs.wait_for(100);
+    }
+    assert_eq!(inputs.shown(EVENT_MISSED), 1);
+}
+
 #[test]
 fn inputs_that_are_not_fetched_are_missed_as_well() {
     let mut inputs = InStep::up("EL3102");
