@@ -180,9 +180,8 @@ fn what_is_seen_online_is_read_and_written_by_ads() {
     let counts = running.status()["ads"].clone();
     assert_eq!(counts["net_id"], "127.0.0.1.2.1");
     // The address by which this SubDevice was asked stands in its information.
-    let devices = running.status()["devices"].clone();
-    let mut stations = devices.as_array().unwrap().iter().filter(|one| one["station"] == STEPPER);
-    let info = &stations.next().unwrap()["info"];
+    let shown = running.until("is shown", |report| report["devices"][2]["station"] == STEPPER);
+    let info = &shown["devices"][2]["info"];
     assert_eq!(info["ads_address"], format!("127.0.0.1.2.1:{STEPPER}"), "{info}");
     assert_eq!(counts["requests"], counts["answers"], "{counts}");
     let expected = serde_json::json!({

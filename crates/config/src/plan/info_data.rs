@@ -112,7 +112,8 @@ pub(super) fn drive_channels(profile: &DeviceProfile) -> Vec<u8> {
         let outputs = profile.pdos.iter().filter(|pdo| pdo.direction == Direction::Outputs);
         outputs.flat_map(|pdo| &pdo.entries).any(|entry| entry.index == index)
     };
-    (0..MAX_CHANNELS).filter(has_controlword).collect()
+    // Without a first axis 0x7040 is an output of the fifth channel of a terminal (ETG.5001).
+    (0..MAX_CHANNELS).take_while(has_controlword).collect()
 }
 
 #[cfg(test)]
@@ -299,6 +300,8 @@ mod tests {
         };
         let (outputs, inputs) = (Direction::Outputs, Direction::Inputs);
         assert_eq!(channels(Protocols::COE, 0, vec![pdo(outputs, &[0x7000])]), [0_u8; 0]);
+        let terminal = pdo(outputs, &[0x7000, 0x7010, 0x7020, 0x7030, 0x7040]);
+        assert_eq!(channels(Protocols::COE, 0, vec![terminal]), [0_u8; 0], "digital outputs");
         assert_eq!(channels(Protocols::COE, 0, vec![pdo(outputs, &[0x6040, 0x607A])]), [0]);
         assert_eq!(channels(Protocols::COE, 0, vec![pdo(outputs, &[0x6840, 0x6040])]), [0, 1]);
         assert_eq!(
