@@ -467,9 +467,9 @@ fn progress_of_a_file_is_told_and_where_it_broke_off() {
     // Told ten times a second at most: the first packet, then what the SubDevice is busy with is too soon.
     let told: Vec<String> = events
         .iter()
-        .filter_map(|event| match event {
-            Event::FileProgress { progress, .. } => Some(progress.to_string()),
-            _ => None,
+        .filter_map(|event| {
+            let Event::FileProgress { progress, .. } = event else { return None };
+            Some(progress.to_string())
         })
         .collect();
     assert_eq!(told, ["0 of 50 bytes"]);

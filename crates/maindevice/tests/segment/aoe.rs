@@ -62,9 +62,9 @@ fn ask(
     bench.device.serve(bench.now, id, Service::Mailbox(request));
     assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::Served { .. })));
     match bench.events.pop() {
-        Some((_, Event::Served { result, .. })) => (*result).map(|answer| match answer {
-            ServiceAnswer::Data(data) => data,
-            other => panic!("{other:?}"),
+        Some((_, Event::Served { result, .. })) => (*result).map(|answer| {
+            let ServiceAnswer::Data(data) = answer else { panic!("{answer:?}") };
+            data
         }),
         other => panic!("{other:?}"),
     }

@@ -175,7 +175,12 @@ fn settings(xml: &mut Xml, device: &DevicePlan) {
                             StartUpAction::SendVendorMessage { answer_within, .. } => {
                                 answer_within.as_nanos() / 1_000_000
                             }
-                            _ => 0,
+                            StartUpAction::CoeDownload { .. }
+                            | StartUpAction::SetAddresses { .. }
+                            | StartUpAction::WriteIdn { .. }
+                            | StartUpAction::Ads { .. }
+                            | StartUpAction::WriteFile { .. }
+                            | StartUpAction::RegisterWrite { .. } => 0,
                         };
                         xml.text("Timeout", timeout);
                         match &command.action {
