@@ -356,8 +356,10 @@ fn everything() -> Plan {
 
 #[test]
 fn a_plan_with_something_of_everything_comes_back() {
-    let plan = everything();
+    let mut plan = everything();
     assert_eq!(plan.inputs_len, 4 + 2, "three times four bits");
+    // An ENI does not say which channels a drive has.
+    plan.devices.iter_mut().for_each(|device| device.channels.clear());
     let text = write("Prüfstand", &plan);
     let back = Eni::parse(text.as_bytes()).unwrap();
     assert_eq!(back.name, "Prüfstand");

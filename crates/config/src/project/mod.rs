@@ -518,7 +518,7 @@ pdos = [
             ("transition = \"PS\"", "transition = \"X\"", "letters I, P, S, O, B"),
             ("data = \"08\"", "data = \"8\"", "two for each byte"),
             ("cycle_us = 500", "cycle_us = 0", "expected a cycle time"),
-            ("index = 0x6060", "", "one of `index`, `register`, `idn` and `eoe`"),
+            ("index = 0x6060", "", "one of `index`, `register`, `idn`, `eoe` and `net_id`"),
             ("layout = \"compact\"", "layout = \"tight\"", "unknown variant `tight`"),
             (
                 "watchdog = { process_data",
