@@ -6,7 +6,7 @@ use linesman_proto::address::DeviceId;
 use linesman_proto::ads::{AdsAnswer, AdsCode, AdsCommand, AdsRequest, AmsNetId, index};
 use serde::Serialize;
 
-use super::sdo::value::{bytes, whole};
+use super::sdo::value::{bytes, number, whole};
 use super::service::{DeviceReport, ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -81,11 +81,6 @@ enum Action {
         /// Six numbers with points between them: 192.168.1.5.3.1
         new: AmsNetId,
     },
-}
-
-fn number(text: &str) -> Result<u32, String> {
-    let number = whole(text).and_then(|number| u32::try_from(number).ok());
-    number.ok_or_else(|| format!("`{text}`: expected a number up to 0xFFFFFFFF"))
 }
 
 fn port(text: &str) -> Result<u16, String> {

@@ -7,7 +7,7 @@ use linesman_maindevice::service::Service;
 use linesman_proto::address::DeviceId;
 use serde::Serialize;
 
-use super::sdo::value::whole;
+use super::sdo::value::number;
 use super::service::{DeviceReport, ServiceError, ServiceLine, ServiceTarget, end};
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -46,16 +46,11 @@ struct Transfer {
     /// The file here
     file: PathBuf,
     /// The password of the SubDevice's manual: 0x12345678
-    #[arg(long, value_parser = password, default_value = "0")]
+    #[arg(long, value_parser = number, default_value = "0")]
     password: u32,
     /// Take it to BOOT for this, as firmware needs, and back to its state
     #[arg(long)]
     boot: bool,
-}
-
-fn password(text: &str) -> Result<u32, String> {
-    let number = whole(text).and_then(|number| u32::try_from(number).ok());
-    number.ok_or_else(|| format!("`{text}`: expected a number up to 0xFFFFFFFF"))
 }
 
 /// A file that was moved.

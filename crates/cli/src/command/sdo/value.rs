@@ -115,6 +115,12 @@ pub(crate) fn parse_sized(text: &str, size: usize) -> Result<Vec<u8>, String> {
     Ok(number.to_le_bytes()[..size].to_vec())
 }
 
+/// Number of 32 bits without a sign, for an option.
+pub(crate) fn number(text: &str) -> Result<u32, String> {
+    let number = whole(text).and_then(|number| u32::try_from(number).ok());
+    number.ok_or_else(|| format!("`{text}`: expected a number up to 0xFFFFFFFF"))
+}
+
 /// `300`, `-1`, `0x12C`, `0b101`.
 pub(crate) fn whole(text: &str) -> Option<i128> {
     let (negative, digits) = match text.strip_prefix('-') {
