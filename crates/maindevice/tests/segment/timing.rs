@@ -301,6 +301,17 @@ fn waits_for_programs() -> impl Fn(&[u8]) -> Span {
     }
 }
 
+/// Programs of the three tasks take their times exactly, over no cable.
+fn timing_of_tasks() -> TimingOptions {
+    TimingOptions {
+        execution: TASKS.map(|(name, us)| (name.to_owned(), Span::us(us))).to_vec(),
+        jitter: Some(Span::ZERO),
+        task_jitter: Some(Span::ZERO),
+        cable_m: Some(0),
+        ..TimingOptions::default()
+    }
+}
+
 // S0 L656-688.
 // proves: SYN-28 (S)
 #[test]
@@ -316,15 +327,7 @@ fn of_three_tasks_the_verdict_by_the_last_frame_agrees_with_what_the_subdevices_
         let mut bench = Bench::new(THREE_TASKS);
         let mut plan = three_tasks(&mut bench, &times);
         plan.outputs_shift = shift_us.map(Span::us);
-        let execution = TASKS.map(|(name, us)| (name.to_owned(), Span::us(us))).to_vec();
-        let options = TimingOptions {
-            execution,
-            jitter: Some(Span::ZERO),
-            task_jitter: Some(Span::ZERO),
-            cable_m: Some(0),
-            ..TimingOptions::default()
-        };
-        let timing = plan.timing(&options);
+        let timing = plan.timing(&timing_of_tasks());
         let case = format!("shift {shift_us:?}: {timing:#?}");
         assert_eq!(timing.verdict(), expected, "{case}");
         for device in &timing.devices {
@@ -389,14 +392,7 @@ fn of_three_tasks_inputs_are_a_cycle_older_where_the_plan_fails_the_second_rule_
     let mut times = measured();
     let both = times[1].outputs;
     times.push(SyncTimes { outputs: both, inputs: both });
-    let execution = TASKS.map(|(name, us)| (name.to_owned(), Span::us(us))).to_vec();
-    let options = TimingOptions {
-        execution,
-        jitter: Some(Span::ZERO),
-        task_jitter: Some(Span::ZERO),
-        cable_m: Some(0),
-        ..TimingOptions::default()
-    };
+    let options = timing_of_tasks();
     let mut compared = [0; 3];
     for before_us in [100, 40, 20, 16, 14, 10, 8, 6, 4, 3, 2, 1] {
         let mut bench = Bench::new(THREE_TASKS);
