@@ -62,9 +62,9 @@ pub enum StartUpAction {
         target: AmsAddress,
         /// Sender.
         source: AmsAddress,
-        /// What is asked.
+        /// Command of ADS.
         command: AdsCommand,
-        /// What follows the AMS header.
+        /// Bytes behind the AMS header.
         data: Vec<u8>,
     },
     /// Brings a file by FoE; when, as for CoE.
@@ -78,9 +78,9 @@ pub enum StartUpAction {
     },
     /// Sends a message of the vendor's own protocol (VoE); when, as for CoE.
     SendVendorMessage {
-        /// What follows the mailbox header.
+        /// Bytes behind the mailbox header.
         data: Vec<u8>,
-        /// How long an answer is waited for, which need not come.
+        /// Time in which an answer is waited for, which need not come.
         answer_within: Span,
     },
     /// Writes registers of the controller, before the new state is asked for.

@@ -378,7 +378,7 @@ pub enum Event {
     FileProgress {
         /// Whose.
         id: DeviceId,
-        /// How far.
+        /// Bytes that are through, and what keeps the SubDevice busy.
         progress: FileProgress,
     },
     /// A mailbox message that nobody had asked for.

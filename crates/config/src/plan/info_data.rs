@@ -54,8 +54,7 @@ impl Plan {
     /// Information of a SubDevice of this plan, in a network with this NetId.
     ///
     /// The NetId for AoE is the configured one, else that of the network with the station address in place of the last two
-    /// bytes. The times
-    /// leave out what the SubDevice needs itself.
+    /// bytes. The times leave out what the SubDevice needs itself.
     #[must_use]
     pub fn info_data(&self, device: &DevicePlan, net_id: Option<AmsNetId>) -> InfoData {
         let speaks_aoe = device.mailbox.is_some_and(|one| one.protocols.has(Protocols::AOE));

@@ -52,9 +52,9 @@ pub enum LastHop {
         hop: Hop,
         /// The card that counted.
         card: Path,
-        /// How many, beyond those that controllers counted.
+        /// Number of them, without those that controllers counted.
         frames: u64,
-        /// How many of those that it counted controllers had counted, too.
+        /// Number of damaged frames that controllers had counted.
         carried: u64,
         /// When the card first reported some.
         first: Instant,

@@ -77,7 +77,7 @@ pub struct Pairing {
     whole: u64,
     /// Whether that is so of the latest one of which it is known.
     was_whole: bool,
-    /// Whether the ring was whole once, and of a later request one copy alone came back.
+    /// True if the ring was whole once, and of a later request one copy alone came back.
     has_lost_copies: bool,
     /// Returns that were taken for requests, since this was asked.
     mistaken: u64,

@@ -10,7 +10,7 @@ use super::failure::Why;
 use super::pass::copy;
 use super::transaction::MailboxTransaction;
 
-/// What is expected, in messages.
+/// Expected answer, as failures name it.
 const EXPECTED: &str = "the answer to an ADS request";
 
 /// Sends a request, and gives what its answer has behind the result; of reading the bytes alone.

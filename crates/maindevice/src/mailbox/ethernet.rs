@@ -49,7 +49,7 @@ const FRAGMENT_REFUSED_WITHIN: Span = Span::s(2);
 #[derive(Clone, Copy, Default, Debug)]
 pub(super) struct UnansweredFragments {
     count: u32,
-    /// When the last one was sent.
+    /// Time when the last one was sent.
     last: Instant,
 }
 

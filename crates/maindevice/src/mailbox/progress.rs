@@ -9,25 +9,25 @@ use linesman_proto::time::Span;
 /// Between two reports of one transfer, so that short packets flood nobody.
 pub(super) const PROGRESS_INTERVAL: Span = Span::ms(100);
 
-/// How far the transfer of a file has come.
+/// State of the transfer of a file.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FileProgress {
     /// Bytes of the file that are through.
     pub done: usize,
     /// Bytes of the whole file; `None` while nobody knows, as in reading.
     pub total: Option<usize>,
-    /// What the SubDevice is busy with; `None`: it takes packets, or gives them.
+    /// Work that keeps the SubDevice busy; `None`: it takes packets, or gives them.
     pub busy: Option<FileBusy>,
 }
 
 /// Answer "busy" of a SubDevice.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FileBusy {
-    /// How much of `total` is done, in the SubDevice's unit.
+    /// Part of `total` that is done, in the SubDevice's unit.
     pub done: u16,
     /// All that is to be done; 0: it does not say.
     pub total: u16,
-    /// What it does, in its words; may be empty.
+    /// Name of the work in its words; may be empty.
     pub text: String,
 }
 

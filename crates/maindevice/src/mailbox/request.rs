@@ -109,18 +109,18 @@ pub enum MailboxRequest {
         net_id: Option<AmsNetId>,
         /// The AMS port.
         port: u16,
-        /// Who asks; `None`: the MainDevice.
+        /// Address of the one who asks; `None`: the MainDevice.
         source: Option<AmsAddress>,
-        /// What is asked.
+        /// Command of ADS.
         command: AdsCommand,
-        /// What follows the AMS header, as [`AdsRequest::to_bytes`] gives it.
+        /// Bytes behind the AMS header, as [`AdsRequest::to_bytes`] gives it.
         data: Vec<u8>,
     },
     /// Send a message of the vendor's own protocol (VoE): what answers it; nothing where it is not answered.
     SendVendorMessage {
-        /// What follows the mailbox header: vendor id, the vendor's number, data.
+        /// Bytes behind the mailbox header: vendor id, the vendor's number, data.
         data: Vec<u8>,
-        /// How long an answer is waited for.
+        /// Time in which an answer is waited for.
         answer_within: Span,
     },
     /// Pass on a message of a client of the mailbox gateway: the mailbox messages that answer it, each with its
@@ -279,14 +279,14 @@ pub enum MailboxOperation {
     Ads {
         /// The AMS port.
         port: u16,
-        /// What is asked.
+        /// Command of ADS.
         command: AdsCommand,
         /// Index group and offset, where the command has them.
         place: Option<(u32, u32)>,
     },
     /// Sending a message of the vendor's own protocol.
     SendVendorMessage {
-        /// How many bytes it has.
+        /// Its length in bytes.
         len: usize,
     },
     /// Passing on a message of a client of the mailbox gateway.

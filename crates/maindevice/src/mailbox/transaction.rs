@@ -28,7 +28,7 @@ pub(crate) struct MailboxTransaction<'a> {
     /// How long each answer is waited for.
     pub(crate) patience: Span,
     until: Instant,
-    /// When progress is told again.
+    /// Time from which progress is told again.
     next_progress: Instant,
 }
 

@@ -74,7 +74,7 @@ impl AdsCode {
         })
     }
 
-    /// What to do about it, in one sentence with a full stop.
+    /// Next step of whoever gets it, in one sentence with a full stop.
     #[must_use]
     pub const fn action(self) -> &'static str {
         match self {

@@ -343,7 +343,7 @@ impl AdsAnswer {
 pub struct AdsAnswerError {
     /// The command that was asked.
     pub command: AdsCommand,
-    /// What its answer is.
+    /// Its answer in words.
     pub expected: &'static str,
     /// Bytes there were.
     pub len: usize,

@@ -1,4 +1,4 @@
-//! What a device keeps step with: itself, frames, or a signal of its clock.
+//! Synchronisation mode of a device: in step with itself, with frames, or with a signal of its clock.
 //!
 //! Read first: ETG.1020, synchronisation; 0x1C32 and 0x1C33, subindices 01 and 04; 0x0981.
 
@@ -11,7 +11,7 @@ const FREE_RUN: u64 = 1 << 0;
 const WITH_FRAMES: u64 = 1 << 1;
 const WITH_CLOCK: u64 = 0b111 << 2;
 
-/// What the device keeps step with.
+/// Synchronisation mode of a device.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum SyncMode {
     /// Its own timer.

@@ -114,11 +114,11 @@ pub(super) struct Synchronisation {
     takes: Option<Span>,
     drive_at: Option<Instant>,
     latch_at: Option<Instant>,
-    /// When what was latched can be fetched.
+    /// Time from which latched inputs can be fetched.
     give_at: Option<Instant>,
 }
 
-/// What is due.
+/// Work of the application that is due.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub(super) struct DueWork {
     /// Outputs are driven.
@@ -436,7 +436,7 @@ impl Synchronisation {
         self.latch_at.is_some()
     }
 
-    /// What is due at `now`.
+    /// Takes the work that is due at `now`.
     pub(super) fn take_due(&mut self, now: Instant) -> DueWork {
         let take = |at: &mut Option<Instant>| at.take_if(|at| *at <= now);
         let drive = take(&mut self.drive_at).is_some();
