@@ -26,7 +26,9 @@ pub mod watch;
 
 pub use cyclic::{FrameStatus, OutsideTime, Quality, TaskTimes};
 pub use event::Event;
-pub use exchange::{Access, DatagramData, ExchangeError, Reply, Request, Target, Transmit};
+pub use exchange::{
+    Access, DatagramData, Departure, ExchangeError, Reply, Request, Target, Transmit,
+};
 pub use main_device::{MainDevice, ProbeRequest};
 pub use network_group::NetworkGroup;
 pub use options::{CounterPoll, Options, Polling, Rounds};

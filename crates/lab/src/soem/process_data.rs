@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use linesman_maindevice::{DatagramData, Request, Target};
+use linesman_maindevice::{DatagramData, Departure, Request, Target};
 use linesman_proto::address::LogicalAddress;
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
@@ -92,7 +92,7 @@ impl ProcessData {
                 data: data.unwrap_or_default(),
                 card: None,
                 repeats: 0,
-                alone: false,
+                departure: Departure::Together,
             }];
             requests.extend(self.leader.filter(|_| at == 0).map(|leader| self.time_of(leader)));
             out.push((self.bus.start(&requests), requests, segment));

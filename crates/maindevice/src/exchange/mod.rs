@@ -23,7 +23,7 @@ use linesman_proto::ethernet::{MAX_LEN, MIN_LEN, MacAddress};
 use linesman_proto::frame::{FrameBuilder, MAX_DATAGRAM_DATA};
 use linesman_proto::time::{Instant, Span};
 
-pub use request::{Access, DatagramData, ExchangeError, Reply, Request, Target};
+pub use request::{Access, DatagramData, Departure, ExchangeError, Reply, Request, Target};
 
 use outgoing::Outgoing;
 use prebuilt::Prebuilt;
@@ -83,6 +83,8 @@ pub(crate) struct Exchange {
     earliest: Instant,
     outgoing: Outgoing,
     queue: VecDeque<Queued>,
+    /// When the first of the queue was first held back because other frames are out.
+    held_back: Option<Instant>,
     acyclic_out: usize,
     number: u32,
     patience: Span,
@@ -107,6 +109,7 @@ impl Exchange {
             waiting: 0,
             outgoing: Outgoing::new(),
             queue: VecDeque::new(),
+            held_back: None,
             acyclic_out: 0,
             number: 0,
             patience,
@@ -149,12 +152,13 @@ impl Exchange {
         !self.outgoing.is_empty()
     }
 
-    /// Packs queued datagrams into one frame of at most `room` bytes, or of one datagram, and sends it.
-    pub(crate) fn send_acyclic(&mut self, now: Instant, room: usize) {
-        if self.queue.is_empty() {
-            return;
+    /// Packs queued datagrams into one frame of at most `room` bytes, or of one datagram, and sends it. False if none
+    /// goes out.
+    pub(crate) fn send_acyclic(&mut self, now: Instant, room: usize) -> bool {
+        if self.queue.is_empty() || self.waits_for_quiet_line(now) {
+            return false;
         }
-        let Some((at, number)) = self.free_slot() else { return };
+        let Some((at, number)) = self.free_slot() else { return false };
         let slot = &mut self.slots[usize::from(at)];
         slot.sent.resize(MAX_LEN, 0);
         slot.requests.clear();
@@ -173,6 +177,23 @@ impl Exchange {
         self.outgoing.push(at);
         self.acyclic_out += 1;
         self.wait_until(deadline);
+        true
+    }
+
+    /// True while the first of the queue is held back because other frames are out.
+    fn waits_for_quiet_line(&mut self, now: Instant) -> bool {
+        let wants_quiet =
+            self.queue.front().is_some_and(|one| one.request.departure == Departure::QuietLine);
+        if !wants_quiet || self.waiting == 0 {
+            self.held_back = None;
+            return false;
+        }
+        let since = *self.held_back.get_or_insert(now);
+        let waits = now < since + request::QUIET_WITHIN;
+        if !waits {
+            self.held_back = None;
+        }
+        waits
     }
 
     /// Takes over the frames of a plan, and gives them to those who send them. Those of the last one must

@@ -3,7 +3,7 @@
 use linesman_proto::frame::size::frame_size;
 use linesman_proto::frame::{DATAGRAM_OVERHEAD, FrameBuilder};
 
-use super::request::Request;
+use super::request::{Departure, Request};
 
 /// Names a request until its answer is fetched.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -33,8 +33,8 @@ pub(crate) fn pack(
     while packed.len() < most
         && let Some(next) = queue.front()
     {
-        let Request { command, address, data, alone, .. } = &next.request;
-        let alone = *alone;
+        let Request { command, address, data, departure, .. } = &next.request;
+        let alone = *departure != Departure::Together;
         if alone && !packed.is_empty() {
             return;
         }

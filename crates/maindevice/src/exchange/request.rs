@@ -104,9 +104,27 @@ pub struct Request {
     pub card: Option<Path>,
     /// How often it is sent again when its frame does not come back.
     pub repeats: u8,
-    /// It has a frame of its own.
-    pub alone: bool,
+    /// What may be on its way beside it.
+    pub departure: Departure,
 }
+
+/// Whatever else may be on its way when a datagram leaves.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Departure {
+    /// Anything: it shares its frame with others.
+    #[default]
+    Together,
+    /// Other frames: it has one of its own.
+    OwnFrame,
+    /// Nothing: it waits until all frames are back, or given up, and has a frame of its own. Controllers of the first
+    /// generation and ET1200 take the next frame that comes in at their ports for the one that latches receive times (S1
+    /// 9.1.2): one that was ahead of it would give them a wrong time. Where the line is never quiet for
+    /// [`QUIET_WITHIN`] it leaves all the same.
+    QuietLine,
+}
+
+/// Longest wait for a quiet line: a few cycles of a slow task.
+pub const QUIET_WITHIN: Span = Span::ms(20);
 
 impl Request {
     /// Reads `len` bytes from a register on.
@@ -118,8 +136,14 @@ impl Request {
             data: SmallVec::from_elem(0, usize::from(len)),
             card: target.card(),
             repeats: 0,
-            alone: false,
+            departure: Departure::Together,
         }
+    }
+
+    /// The same on a quiet line.
+    pub(crate) fn on_quiet_line(mut self) -> Self {
+        self.departure = Departure::QuietLine;
+        self
     }
 
     /// The same for a SubDevice that has no station address, if it is of one that stands in this list: by
@@ -160,7 +184,7 @@ impl Request {
             data: SmallVec::from_slice(data),
             card: target.card(),
             repeats: 0,
-            alone: false,
+            departure: Departure::Together,
         }
     }
 

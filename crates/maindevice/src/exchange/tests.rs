@@ -53,6 +53,27 @@ fn reply_of(exchange: &Exchange, slot: u8) -> ([u8; 2], u8) {
     ([reply[26], reply[27]], reply[28])
 }
 
+// S1 9.1.2: controllers of the first generation and ET1200 take the next frame that comes in for the one that latches.
+#[test]
+fn request_for_a_quiet_line_waits_until_all_frames_are_back() {
+    let mut exchange = exchange(false);
+    exchange.submit(queued(1, read(0x1001, 0))).unwrap();
+    let before = transmit(&mut exchange);
+    exchange.submit(queued(2, read(0x1002, 0).on_quiet_line())).unwrap();
+    exchange.submit(queued(3, read(0x1003, 0))).unwrap();
+    assert_eq!(transmit(&mut exchange), [], "one is out");
+    exchange.receive(NOW, Path::A, &answered(&before[0].1, [8, 0], 1));
+    // It has a frame of its own; who came later goes after it.
+    let quiet = transmit(&mut exchange);
+    assert_eq!(quiet.len(), 1);
+    assert_eq!(&quiet[0].1[18..20], &0x1002_u16.to_le_bytes());
+    assert_eq!(transmit(&mut exchange).len(), 1);
+    // Where the line is never quiet it leaves all the same.
+    exchange.submit(queued(4, read(0x1004, 0).on_quiet_line())).unwrap();
+    assert_eq!(transmit(&mut exchange), []);
+    assert!(exchange.send_acyclic(NOW + request::QUIET_WITHIN, MAX_LEN));
+}
+
 #[test]
 fn datagrams_of_many_share_a_frame() {
     let mut exchange = exchange(false);

@@ -169,11 +169,14 @@ impl MainDevice {
         if self.exchange.acyclic_out() >= self.options.frames_at_once {
             return;
         }
-        let mut room = MAX_LEN;
+        let (mut room, mut left) = (MAX_LEN, self.acyclic_left);
         // Beside process data so many a cycle; before, as fast as they come back.
         let settled = |running: &&RunningPlan| lock(&running.device_table).all_have_been_reached();
         if let Some(running) = self.running.as_ref().filter(settled) {
-            let Some(left) = self.acyclic_left.checked_sub(1) else { return };
+            left = match left.checked_sub(1) {
+                Some(left) => left,
+                None => return,
+            };
             let until = running.cyclic.due().since(now).as_nanos() / BYTE_NS;
             room = usize::try_from(until).unwrap_or(MAX_LEN);
             room = room.saturating_sub(WIRE_OVERHEAD).min(MAX_LEN);
@@ -181,9 +184,10 @@ impl MainDevice {
             if room < MIN_LEN && self.acyclic_left < self.options.frames_at_once {
                 return;
             }
+        }
+        if self.exchange.send_acyclic(now, room) {
             self.acyclic_left = left;
         }
-        self.exchange.send_acyclic(now, room);
     }
 
     #[inline]

@@ -16,7 +16,7 @@ use linesman_proto::topology::{DelayError, Delays, Reconstruction, SeenControlle
 
 use super::read_only_scan::{self, ReadOnlyScanError};
 use super::set_up::write_all;
-use crate::exchange::{DatagramData, ExchangeError, Reply, Request, Target};
+use crate::exchange::{DatagramData, Departure, ExchangeError, Reply, Request, Target};
 use crate::executor::Wire;
 
 /// How much longer a frame takes through a controller whose processing unit it passes (S1 9.1.2).
@@ -128,7 +128,7 @@ async fn latch_once(wire: &Wire, network: Network) -> Result<Latch, ClockError> 
     }
     let at = wire.now();
     let all = register::RECEIVE_TIME.address;
-    wire.ask(Request::write(Target::All, all, &[0; 4])).await?;
+    wire.ask(Request::write(Target::All, all, &[0; 4]).on_quiet_line()).await?;
     let reading: Vec<_> = (places.iter().zip(&seen))
         .map(|(place, (features, ..))| {
             features.distributed_clocks().then(|| {
@@ -261,7 +261,7 @@ pub(crate) async fn compensate(
             data: DatagramData::from_slice(&expected.to_le_bytes()),
             card: None,
             repeats: 0,
-            alone: true,
+            departure: Departure::OwnFrame,
         };
         let led = is_led.then(|| wire.submit(request(Command::Fpwr)));
         // A lost one is one less.

@@ -91,7 +91,8 @@ async fn measure(context: &Context) -> Result<Option<i64>, ExchangeError> {
         (reference, others)
     };
     let alone = clocks::latch_alone(context).await;
-    wire.ask(Request::write(Target::All, register::RECEIVE_TIME.address, &[0; 4])).await?;
+    let latch = Request::write(Target::All, register::RECEIVE_TIME.address, &[0; 4]);
+    wire.ask(latch.on_quiet_line()).await?;
     let latched = |station: StationAddress, card: Path| {
         let unit = register::RECEIVE_TIME_PROCESSING_UNIT;
         wire.ask(Request::read(Target::Station(station), unit.address, unit.len).by_card(card))

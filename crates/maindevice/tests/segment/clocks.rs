@@ -182,6 +182,45 @@ fn clocks_are_aligned_to_100_ns_and_stay_so() {
     }
 }
 
+/// Terminals whose controllers take the next frame at a port for the one that latches receive times (ET1200), with up to a
+/// hundred SubDevices behind, so that frames ahead of that one are still under way there.
+fn behind_an_et1200() -> String {
+    let device = |number: usize| {
+        let (kind, on) = match number {
+            0 => ("EK1100", "maindevice".to_owned()),
+            1 => ("EL2008", "D0.B".to_owned()),
+            2 => ("EK1110", "D1.B".to_owned()),
+            3 => ("EK1100", "D2.B".to_owned()),
+            _ if number % 20 == 3 => ("EL4102", format!("D{}.B", number - 1)),
+            _ => ("EL2008", format!("D{}.B", number - 1)),
+        };
+        format!("[[device]]\nname = \"D{number}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    (0..104).map(device).collect()
+}
+
+// proves: DC-04 partial
+#[test]
+fn frames_ahead_of_the_one_that_latches_spoil_no_delay() {
+    let mut bench = Bench::new(&behind_an_et1200());
+    let plan = plan(&mut bench, |kind| kind == "EL4102");
+    start(&mut bench, plan.clone());
+    bench.run_for(Span::s(6));
+    assert!(spread(&bench, &plan) <= 100, "{} ns apart", spread(&bench, &plan));
+    // A terminal at the end goes and comes again: the delays are measured beside all that brings it up.
+    let last = plan.devices.last().unwrap();
+    let entry = FaultEntry::new(FaultName::DeviceOff).device(format!("D{}", last.id.index()));
+    let fault = bench.segment.inject(bench.now, &entry).unwrap();
+    bench.run_for(Span::s(1));
+    bench.segment.heal(bench.now, fault);
+    let others: Vec<_> = plan.devices.iter().filter(|one| one.id != last.id).cloned().collect();
+    for _ in 0..100 {
+        bench.run_for(Span::ms(20));
+        let others = Plan { devices: others.clone(), ..plan.clone() };
+        assert!(spread(&bench, &others) <= 100, "{} ns apart", spread(&bench, &others));
+    }
+}
+
 #[test]
 fn a_subdevice_that_comes_back_gets_its_clock_anew() {
     let mut bench = Bench::new(&plant());
