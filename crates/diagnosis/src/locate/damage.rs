@@ -16,7 +16,7 @@ use linesman_proto::topology::{End, Hop, Route};
 
 use super::input::LocateInput;
 use super::intervals::Intervals;
-use crate::model::{CounterTrack, Counting, Rise};
+use crate::model::{CounterTrack, Counting, Rise, Tally};
 
 /// Damage on one hop: a link in one direction, with the sender and the receiver at its ends.
 #[derive(Clone, PartialEq, Debug)]
@@ -119,8 +119,19 @@ impl Located {
     }
 }
 
+/// Frames that were lost, as far as the way into one card may have to do with them.
+enum LostAtCard {
+    /// In a ring, copies that did not come to it.
+    Copies(Tally),
+    /// Frames of which nothing came back.
+    Frames(Tally),
+}
+
 /// Links that come up together with the computer spoil the first frames; those are not missed.
 const COMING_UP: Span = Span::ms(100);
+
+/// Frames in a row that are too many to have been hit one by one.
+const IN_A_ROW: u64 = 8;
 
 /// Cards tell what they counted so long after it at most.
 const CARD_READ_WITHIN: Span = Span::ms(300);
@@ -416,15 +427,25 @@ impl ErrorWalk<'_, '_> {
         })
     }
 
+    /// Losses that the way into a card may have to do with; none where copies were lost to the other card alone: what one
+    /// card sends for itself is lost as a whole where its copies are.
+    fn losses_at(&self, card: Path) -> Option<LostAtCard> {
+        let losses = &self.input.model().traffic.losses;
+        let (frames, copies) = (losses.frames(), losses.copies(card));
+        // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
+        if copies.of_spell() > frames.of_spell() {
+            return Some(LostAtCard::Copies(copies));
+        }
+        let elsewhere = losses.copies(card.other()).of_spell();
+        (elsewhere <= frames.of_spell()).then_some(LostAtCard::Frames(frames))
+    }
+
     /// Frames that were lost while no counter moved and none of the card is known.
     fn unknown(&self, route: &Route) -> Option<LastHop> {
         let card = route.arrives_at()?;
         let hop = *route.hops().last()?;
         let model = self.input.model();
-        // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
-        let copies = model.traffic.losses.copies(card);
-        let whole = model.traffic.losses.frames();
-        let lost = if copies.of_spell() > whole.of_spell() { copies } else { whole };
+        let (LostAtCard::Copies(lost) | LostAtCard::Frames(lost)) = self.losses_at(card)?;
         let (first, last) = (lost.first_of_spell?, lost.last?);
         let is_silent = self.carried.frames == 0 && !model.host.is_watched;
         // Counters that were read before the frame was missed say nothing of it.
@@ -434,12 +455,19 @@ impl ErrorWalk<'_, '_> {
         // Somebody who looks for the place where all of them vanish does so in a silence, not in noise.
         let was_searched =
             model.hole.is_some_and(|hole| first <= hole.since.at && hole.since.at <= last);
+        // What vanishes all the while is no single loss, and has a finding of its own.
+        let vanished = model.traffic.losses.swallowed().iter().any(|silence| {
+            silence.frames >= IN_A_ROW
+                && silence.since.at <= first
+                && silence.ended.is_none_or(|ended| last <= ended)
+        });
         let is_cut = model.traffic.recording.cut() > 0;
         let is_unrecorded = model.traffic.recording.was_bad(first, last);
         let is_explained = is_unrecorded
             || is_cut
             || is_first
             || was_searched
+            || vanished
             || self.input.any_link_changed(first, last);
         (is_silent && is_read && !is_explained).then_some(LastHop::Unknown {
             hop,

@@ -282,6 +282,30 @@ fn copies_that_a_card_of_a_ring_misses_are_lost_on_its_last_hop_whatever_was_los
     assert_eq!((card, found[0].frames()), (vec![Path::A], 9));
 }
 
+#[test]
+fn frames_that_are_lost_as_a_whole_beside_copies_to_one_card_accuse_no_other_card() {
+    let wired = [Wired { on: End::MainDevice(Path::A), entry: A }, on(1, B), on(2, B)];
+    let ring = Tree::from_wiring(&wired, Some((2, B))).unwrap();
+    let mut bench = Bench::new(ring, vec![(true, false); 3]);
+    bench.model.traffic.recording.record_frame(bench.now);
+    bench.read_all();
+    bench.now += Span::s(2);
+    // What card A alone sends is lost where its copies are.
+    let mut lost = Tally::default();
+    for cycle in 0..9 {
+        bench.model.traffic.losses.record_copy(Path::B, bench.now);
+        if cycle % 3 == 0 {
+            lost.add(1, bench.now);
+        }
+        bench.now += Span::ms(7);
+    }
+    bench.model.traffic.losses.report(lost);
+    bench.read_all();
+    let found = bench.located(false).last_hops;
+    let card = found.iter().map(LastHop::card).collect::<Vec<_>>();
+    assert_eq!((card, found[0].frames()), (vec![Path::B], 9));
+}
+
 // proves: HW-26, HW-27
 #[test]
 fn clean_symbols_point_inside_a_device_and_several_links_to_interference() {

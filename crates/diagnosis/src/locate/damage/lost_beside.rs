@@ -5,7 +5,7 @@ use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Route;
 
-use super::{COMING_UP, ErrorWalk, LastHop};
+use super::{COMING_UP, ErrorWalk, IN_A_ROW, LastHop, LostAtCard};
 use crate::locate::Intervals;
 use crate::model::CounterTrack;
 use crate::model::counters::RISES_KEPT;
@@ -16,9 +16,6 @@ const IN_FLIGHT: Span = Span::ms(10);
 /// Beside links that changed, and nothing else, so many are too many for chance: a change that is noticed late costs a frame
 /// or two.
 const BESIDE_CHANGES: usize = 4;
-
-/// Frames in a row that are too many to have been hit one by one.
-const IN_A_ROW: u64 = 8;
 
 impl ErrorWalk<'_, '_> {
     /// Frames that were lost beside other damage or links that changed: at a time at which no controller counted anything, as
@@ -31,12 +28,15 @@ impl ErrorWalk<'_, '_> {
         if !self.is_read || is_watched || model.hole.is_some() {
             return None;
         }
-        let counted = self.counting_times(route)?;
         let begin = model.traffic.recording.first()?;
         let losses = &model.traffic.losses;
-        // In a ring one of two copies is lost at a time.
-        let are_copies = losses.copies(card).of_spell() > losses.frames().of_spell();
-        let times = if are_copies { losses.copy_times(card) } else { losses.times() };
+        let (times, counted) = match self.losses_at(card)? {
+            LostAtCard::Copies(_) => {
+                (losses.copy_times(card), self.counting_times(std::slice::from_ref(route))?)
+            }
+            // Of a frame that is lost as a whole nobody knows which way it went.
+            LostAtCard::Frames(_) => (losses.times(), self.counting_times(self.input.routes())?),
+        };
         let mut lost: Vec<Instant> = times
             .iter()
             .copied()
@@ -62,10 +62,11 @@ impl ErrorWalk<'_, '_> {
         Some(LastHop::Unknown { hop, card, lost: lost.len() as u64, is_beside, first, last })
     }
 
-    /// Times in which a controller on the way counted a bad frame or symbol: between two readings.
+    /// Times in which a controller on one of these ways counted a bad frame or symbol: between two readings.
     /// `None` where not all of them are kept.
-    fn counting_times(&self, route: &Route) -> Option<Intervals> {
-        let ports = route.checks().map(|check| (check.node, check.port));
+    fn counting_times(&self, ways: &[Route]) -> Option<Intervals> {
+        let checks = ways.iter().flat_map(Route::checks);
+        let ports = checks.map(|check| (check.node, check.port));
         let tracks = ports.flat_map(|(node, port)| {
             let counters = [
                 ErrorCounter::InvalidFrame(port),
