@@ -40,7 +40,7 @@ use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::End;
 use linesman_proto::topology::route::Direction;
 
-use super::{Rule, RulePage, View};
+use super::{Rule, RulePage, View, state_error};
 use crate::finding::{Alternative, Condition, Evidence, LinkDirection, Place, Severity, Symptom};
 use crate::locate::cause::CausePlace;
 use crate::locate::{Damage, LastHop, LocateInput, Located, Suspicion};
@@ -193,7 +193,8 @@ fn is_history(input: &LocateInput<'_>, suspicion: &Suspicion) -> bool {
 }
 
 /// SubDevices that lost nothing but time: frames that are damaged or lost bring neither outputs nor the
-/// time of the reference clock. A hardware cause wins over what software shows of it (SW-06).
+/// time of the reference clock. A hardware cause wins over what software shows of it (SW-06). One that counts cycles in
+/// which it was not done is too slow by itself.
 pub(super) fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
     let is_of_time = |error: &AlError| {
         let code = error.code.map(|code| code.value);
@@ -202,7 +203,9 @@ pub(super) fn starved(view: &View<'_>) -> impl Iterator<Item = Symptom> {
         })
     };
     let starved = view.model.devices.iter().filter(move |device| {
-        !device.al.errors.is_empty() && device.al.errors.iter().all(is_of_time)
+        !device.al.errors.is_empty()
+            && device.al.errors.iter().all(is_of_time)
+            && state_error::exceeded(device).is_none()
     });
     starved.map(|device| Symptom::StateLost(device.id))
 }

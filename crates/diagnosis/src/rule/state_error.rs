@@ -381,7 +381,7 @@ fn out_of_step(device: &Device, error: &AlError) -> FaultName {
 }
 
 /// How often it was not done with a cycle when the next began, where it counts that.
-fn exceeded(device: &Device) -> Option<u16> {
+pub(super) fn exceeded(device: &Device) -> Option<u16> {
     let counts = device.sync_counts.iter();
     let exceeded = counts.filter(|((_, subindex), _)| *subindex == CYCLE_EXCEEDED);
     exceeded.map(|(_, seen)| seen.value).max().filter(|count| *count > 0)
