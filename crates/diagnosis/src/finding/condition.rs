@@ -66,6 +66,9 @@ pub struct Condition {
     pub symptoms: Vec<Symptom>,
     /// What follows from this condition.
     pub explains: Vec<Symptom>,
+    /// True where the place follows from the amount of a sum alone, which many places together can make: what takes a
+    /// part of the sum at that time explains this.
+    pub is_by_sum_alone: bool,
 }
 
 /// Something that a fault can bring about, as the link between conditions.
@@ -170,6 +173,7 @@ impl Condition {
             actions: Vec::new(),
             symptoms: Vec::new(),
             explains: Vec::new(),
+            is_by_sum_alone: false,
         }
     }
 

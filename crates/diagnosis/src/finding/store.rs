@@ -215,7 +215,8 @@ impl FindingStore {
                 let severity = one.condition.severity.cmp(&other.condition.severity);
                 severity.then(confidence).then(other.id.cmp(&one.id))
             });
-            if let Some(best) = best.or_else(|| self.foremost_of_several(index)) {
+            let of_sum = || self.foremost_of_several(index).or_else(|| self.known_beside(index));
+            if let Some(best) = best.or_else(of_sum) {
                 self.findings[index].parent = Some(self.findings[best].id);
             }
         }
@@ -246,6 +247,29 @@ impl FindingStore {
             (explained, std::cmp::Reverse(*other))
         };
         if is_covered { all.max_by_key(share) } else { None }
+    }
+
+    /// Where the amount of a sum alone names a place, and is over: a finding that took a part of that sum meanwhile.
+    /// What was missing then is known to have had another reason, be it seen late.
+    fn known_beside(&self, index: usize) -> Option<usize> {
+        let effect = &self.findings[index];
+        let closed = effect.closed.filter(|_| effect.condition.is_by_sum_alone)?;
+        let takes_part = |other: &usize| {
+            let cause = &self.findings[*other];
+            let explains = &cause.condition.explains;
+            *other != index
+                && cause.confirmed.is_some()
+                && !cause.condition.is_by_sum_alone
+                && cause.condition.severity == Severity::Error
+                && cause.opened <= closed
+                && cause.closed.is_none_or(|end| effect.opened <= end)
+                && explains.iter().any(|symptom| matches!(symptom, Symptom::WorkingCounter(_)))
+                && !self.follows(*other, effect.id)
+        };
+        let confidence = |other: &usize| self.findings[*other].condition.confidence;
+        (0..self.findings.len())
+            .filter(takes_part)
+            .max_by(|one, other| confidence(one).total_cmp(&confidence(other)).then(other.cmp(one)))
     }
 
     /// Whether a finding follows, at whatever remove, from the one called `id`.
@@ -311,4 +335,42 @@ fn began_after(cause: &Finding, effect: &Finding) -> bool {
 /// Whether a finding was over so long before another one that this does not follow from it.
 fn was_over(cause: &Finding, effect: &Finding, after: Span) -> bool {
     cause.closed.is_some_and(|closed| closed + after < effect.opened)
+}
+
+#[cfg(test)]
+mod tests {
+    use linesman_config::fault::FaultName;
+    use linesman_proto::address::{DeviceId, Network};
+
+    use super::*;
+    use crate::rule::working_counter::PAGE;
+
+    /// What takes the share of a SubDevice from a working counter, from `since` to `ended`, in ms.
+    fn condition(device: u32, since: u64, ended: u64) -> Condition {
+        let at = |ms| Instant::ZERO + Span::ms(ms);
+        let place = Place::device(Network(0), DeviceId(device));
+        let symptom = [Symptom::WorkingCounter(DeviceId(device))];
+        Condition::new(&PAGE, place, FaultName::DeviceOff, at(since))
+            .confirmed(at(since))
+            .ended(at(ended))
+            .explaining(symptom)
+    }
+
+    fn parent_of_guess(known: Condition) -> Option<u32> {
+        let mine = [Symptom::WorkingCounter(DeviceId(9))];
+        let mut guess = condition(9, 2_000, 2_500).about(mine);
+        guess.is_by_sum_alone = true;
+        let mut store = FindingStore::default();
+        store.update(vec![known, guess], Instant::ZERO + Span::s(9), |_, _| {});
+        store.findings()[1].parent
+    }
+
+    #[test]
+    fn place_that_a_sum_alone_names_gives_way_to_what_is_known_to_have_taken_a_part_of_it() {
+        assert_eq!(parent_of_guess(condition(3, 1_900, 2_100)), Some(1));
+        assert_eq!(parent_of_guess(condition(3, 100, 1_900)), None, "it was over before");
+        let mut warning = condition(3, 1_900, 2_100);
+        warning.severity = Severity::Warning;
+        assert_eq!(parent_of_guess(warning), None);
+    }
 }

@@ -365,6 +365,8 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     // explains it of each of them explains this, whoever it is.
     condition =
         condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
+    condition.is_by_sum_alone =
+        known.is_none() && link_changed.is_none() && (!links.is_empty() || !suspects.is_certain);
     if is_sure
         && !lasts
         && let Some(ended) = ended
