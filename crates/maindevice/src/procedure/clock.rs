@@ -10,7 +10,9 @@ use linesman_proto::address::{Network, Path, StationAddress};
 use linesman_proto::command::Command;
 use linesman_proto::frame::builder::DatagramAddress;
 use linesman_proto::port::{Port, PortMap};
-use linesman_proto::register::{self, DlStatus, EscInformation, SystemTimeDifference};
+use linesman_proto::register::{
+    self, ControllerType, DlStatus, EscInformation, SystemTimeDifference,
+};
 use linesman_proto::time::{DcTime, DcTime32, Instant, Span};
 use linesman_proto::topology::{DelayError, Delays, Reconstruction, SeenController};
 
@@ -47,7 +49,7 @@ pub enum ClockError {
     LineChanged,
     /// In a whole ring a port does not keep the time of the copy that card B sends.
     #[error(
-        "station {station}: 0x0900 of port {port} did not change as the frame of card B came by; the ring has to be open to be measured"
+        "station {station}: 0x0900 of port {port} does not keep the time of the frame of card B; the ring has to be open to be measured"
     )]
     OneWay {
         /// Whose port it is.
@@ -68,6 +70,8 @@ pub(crate) struct SeenClock {
     pub(crate) has_clock: bool,
     /// It counts 64 bits, and not 32.
     pub(crate) is_wide: bool,
+    /// Its ports take the time of the next frame that comes in, whichever it is (S1 9.1.2).
+    takes_next: bool,
     /// Local time at which its processing unit saw the latching frame.
     pub(crate) latched: u64,
     /// How long after the first clock of its line it did. `None` without a clock.
@@ -120,7 +124,9 @@ async fn latch_once(wire: &Wire, network: Network) -> Result<Latch, ClockError> 
         let information = EscInformation::from_bytes(information.await?.bytes(0));
         let station = StationAddress(station.await?.word(0));
         let dl_status = DlStatus(dl_status.await?.word(0));
-        seen.push((information.features, station, dl_status));
+        let takes_next =
+            matches!(information.controller, ControllerType::ESC20 | ControllerType::ET1200);
+        seen.push((information.features, station, dl_status, takes_next));
     }
     let mut before = Vec::with_capacity(times_before.len());
     for times in times_before {
@@ -140,7 +146,7 @@ async fn latch_once(wire: &Wire, network: Network) -> Result<Latch, ClockError> 
         })
         .collect();
     let (mut clocks, mut controllers) = (Vec::new(), Vec::new());
-    for (reading, (features, station, dl_status)) in reading.into_iter().zip(seen) {
+    for (reading, (features, station, dl_status, takes_next)) in reading.into_iter().zip(seen) {
         let open = PortMap::from_fn(|port| dl_status.port_state(port).is_active());
         let (mut times, mut latched) = (None, 0);
         if let Some([ports, unit]) = reading {
@@ -153,7 +159,8 @@ async fn latch_once(wire: &Wire, network: Network) -> Result<Latch, ClockError> 
         let received =
             |port: Port| times.as_ref().filter(|_| open[port]).map(|times| time_of(times, port));
         controllers.push(SeenController { open, received: PortMap::from_fn(received) });
-        clocks.push(SeenClock { station, has_clock, is_wide, latched, delay: None, card: Path::A });
+        let (delay, card) = (None, Path::A);
+        clocks.push(SeenClock { station, has_clock, is_wide, takes_next, latched, delay, card });
     }
     if wire.ring_intact() != ring_intact {
         // Of a frame that one half processed nothing follows for the other one.
@@ -209,7 +216,9 @@ fn around(
     for node in tree.ring_nodes() {
         let Some(port) = tree.open_ports(node).last() else { continue };
         let kept = controllers[node].received[port];
-        if kept.is_some_and(|time| time == time_of(&before[node], port)) {
+        // The copy of card B may have come by before it was told to take the next one.
+        let takes_next = kept.is_some() && clocks[node].takes_next;
+        if takes_next || kept.is_some_and(|time| time == time_of(&before[node], port)) {
             return Err(ClockError::OneWay { station: clocks[node].station, port });
         }
     }

@@ -296,6 +296,32 @@ fn clocks_of_a_whole_ring_are_in_step_and_it_is_not_opened_for_them() {
     assert_eq!(ring, [true], "it stays whole");
 }
 
+/// A ring through terminals whose controllers take the next frame at a port for the one that latches (ET1200).
+fn ring_through_terminals() -> String {
+    let device = |number: usize| {
+        let (kind, on) = match number {
+            0 => ("EK1100", "maindevice".to_owned()),
+            5 => ("EK1110", "D4.B".to_owned()),
+            6 => ("EK1100", "D5.B".to_owned()),
+            _ => ("EL4102", format!("D{}.B", number - 1)),
+        };
+        format!("[[device]]\nname = \"D{number}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    };
+    (0..9).map(device).collect::<String>() + "[ring]\ncloses_at = \"D6.C\"\n"
+}
+
+// proves: DC-01 partial: in a closed ring
+#[test]
+fn ring_whose_ports_keep_the_next_frame_is_opened_to_be_measured() {
+    let options = Options { ring: true, ..Options::default() };
+    let mut bench = Bench::with_options(&ring_through_terminals(), options);
+    let plan = plan(&mut bench, is_terminal);
+    start(&mut bench, plan.clone());
+    bench.run_for(Span::s(6));
+    assert!(spread(&bench, &plan) <= 100, "{} ns apart", spread(&bench, &plan));
+    assert_eq!(bench.device.ring_intact(), Some(true), "it is whole again");
+}
+
 /// Couplers in a ring, 40 m of cable between any two.
 fn long_ring(couplers: usize) -> String {
     let mut text = "name = \"ring\"\nseed = 7\n".to_owned();
