@@ -261,11 +261,14 @@ fn restarted(
     let device = fall.device;
     let is_several = together.len() > 1;
     let is_first = together.iter().all(|other| device.id <= other.device.id);
-    let was_long = match together.iter().filter_map(supply::away).max() {
+    let common_feeder = is_first.then(|| terminal_bus::common_feeder(model, together)).flatten();
+    // One at the end of a bus that dips again and again is missed until it stays: its last start is not the first one.
+    let aways = together.iter().filter_map(supply::away);
+    let away = if common_feeder.is_some() { aways.min() } else { aways.max() };
+    let was_long = match away {
         Some(away) => away >= DIP,
         None => together.iter().any(|one| one.was_long(model, together)),
     };
-    let common_feeder = is_first.then(|| terminal_bus::common_feeder(model, together)).flatten();
     // Without its load the voltage of an overloaded bus is back at once: it dips, again and again.
     let feeder = common_feeder.filter(|_| !was_long);
     let (cause, others) = match (was_long, is_several) {

@@ -366,7 +366,7 @@ fn condition(view: &View<'_>, suspects: &Suspects, deficits: &[(&Cyclic, &Defici
     condition =
         condition.about(suspects.devices.iter().map(|device| Symptom::WorkingCounter(*device)));
     condition.is_by_sum_alone =
-        known.is_none() && link_changed.is_none() && (!links.is_empty() || !suspects.is_certain);
+        link_changed.is_none() && (!suspects.is_certain || (known.is_none() && !links.is_empty()));
     if is_sure
         && !lasts
         && let Some(ended) = ended
