@@ -4,9 +4,10 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use linesman_maindevice::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
+use linesman_proto::time::Instant;
 use linesman_runtime::run as running;
 use linesman_runtime::run::report::RunReport;
-use linesman_runtime::run::{Next, RunOutcome};
+use linesman_runtime::run::{Next, RunOutcome, StartTime};
 
 use crate::Error;
 use crate::handle::PlanId;
@@ -39,6 +40,10 @@ impl Handoff {
 pub(crate) struct Borrowed<'a, A>(pub(crate) &'a mut A);
 
 impl<A: Application> Application for Borrowed<'_, A> {
+    fn start_time(&mut self, now: Instant) -> StartTime {
+        self.0.start_time(now)
+    }
+
     fn cycle(&mut self, io: &mut Io<'_>) -> Next {
         self.0.cycle(io)
     }
@@ -72,6 +77,10 @@ impl<A: Application> ServedApplication<'_, A> {
 }
 
 impl<A: Application> running::Application for ServedApplication<'_, A> {
+    fn start_time(&mut self, now: Instant) -> StartTime {
+        self.application.start_time(now)
+    }
+
     fn cycle(&mut self, io: &mut running::Io<'_>) -> Next {
         self.orders.take(io);
         let next = self.call(io, A::cycle);

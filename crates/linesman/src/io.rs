@@ -4,7 +4,7 @@ use linesman_maindevice::{FrameStatus, OutsideTime, Quality, Statistics, TaskTim
 use linesman_proto::state::{DeviceState, NetworkState};
 use linesman_proto::time::{DcTime, Instant};
 use linesman_runtime::run as running;
-pub use linesman_runtime::run::Next;
+pub use linesman_runtime::run::{Next, StartTime};
 use linesman_session::image::Value;
 
 use crate::application::Handoff;
@@ -14,6 +14,14 @@ use crate::record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
 pub trait Application {
+    /// The time that the network starts in, where its project has `time_source = "program"`; `now` is the time of the run.
+    /// Asked before the first cycle, again and again while it is [awaited](StartTime::Awaited), for 60 s at most. With the
+    /// time of an upper network, told here and in each cycle by [`Io::tell_outside_time`], the network is a clocked
+    /// SubDevice of that: it has its time and its phase.
+    fn start_time(&mut self, _now: Instant) -> StartTime {
+        StartTime::OfHost
+    }
+
     /// One cycle. Where the task exchanges at its begin, it is called when the frames are back: inputs are
     /// fresh, outputs leave at the next begin, whenever this returns. Where it exchanges at its end
     /// ([`RunOptions::exchange_at_end`](crate::RunOptions::exchange_at_end)), it is called when the cycle begins:

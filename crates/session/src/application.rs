@@ -19,9 +19,27 @@ pub enum Next {
     Stop,
 }
 
+/// Time of a network when it starts, where its plan says that a program tells it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StartTime {
+    /// That of this computer: the network begins in a time of its own.
+    OfHost,
+    /// Not known yet: the start waits.
+    Awaited,
+    /// The time outside at this moment (ns since 2000): the network begins in it.
+    Told(DcTime),
+}
+
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
 pub trait Application {
+    /// The time that the network starts in, where its plan has it follow a time that a program tells
+    /// ([`TimeSource::Program`](linesman_config::plan::TimeSource)). Asked before [`begin`](Self::begin), again and again
+    /// while it is awaited, for [`TIME_PATIENCE`](crate::TIME_PATIENCE) at most.
+    fn start_time(&mut self, _now: Instant) -> StartTime {
+        StartTime::OfHost
+    }
+
     /// The line is about to be started with this plan.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use linesman_config::plan::Plan;
+use linesman_config::plan::{Plan, TimeSource};
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
@@ -108,14 +108,17 @@ impl MainDevice {
     }
 
     /// Leads its group, where that has no lead yet; else gives the group that it follows. A network without clocks does
-    /// neither, nor one whose plan says whose time it has.
+    /// neither, nor one whose plan says whose time it has; one below an upper network only follows.
     fn join_group(&mut self, plan: &mut Plan) -> Option<NetworkGroup> {
         let group = self.options.group.as_ref()?;
-        if plan.time_source.is_some() || plan.reference_clock().is_none() {
+        let is_below = plan.time_source == Some(TimeSource::UpperNetwork);
+        if (plan.time_source.is_some() && !is_below) || plan.reference_clock().is_none() {
             self.lead = None;
             return None;
         }
-        if self.lead.is_none() {
+        if is_below {
+            self.lead = None;
+        } else if self.lead.is_none() {
             self.lead = group.lead().map(Arc::new);
         }
         (self.lead.is_none() && plan.add_clock_shift()).then(|| group.clone())

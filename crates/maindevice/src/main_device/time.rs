@@ -42,6 +42,23 @@ impl MainDevice {
         self.turn.is_some() && self.options.group.as_ref().is_some_and(NetworkGroup::waits)
     }
 
+    /// Lets the networks behind it in its group begin, although it has not started yet: it waits for the time of one of them.
+    pub fn give_up_turn(&mut self) {
+        self.turn = None;
+    }
+
+    /// True if this network is in a group with others.
+    #[must_use]
+    pub fn is_in_group(&self) -> bool {
+        self.options.group.is_some()
+    }
+
+    /// True once the network that leads its group has told its time: a network below it that starts now begins in that time.
+    #[must_use]
+    pub fn knows_group_time(&self) -> bool {
+        self.options.group.as_ref().is_some_and(|group| group.is_led() && group.told().is_some())
+    }
+
     /// By how many ns the time of this network is ahead of that of the network that leads its group, as its frames have it;
     /// negative: it is behind. `None` where it leads, follows nobody, or the time of one of both is not known yet.
     #[must_use]
