@@ -51,6 +51,10 @@ impl<A: Application> Application for Borrowed<'_, A> {
     fn after_outputs(&mut self, io: &mut Io<'_>) {
         self.0.after_outputs(io);
     }
+
+    fn interface_gone(&mut self, io: &mut Io<'_>) {
+        self.0.interface_gone(io);
+    }
 }
 
 /// An application with the services that are asked for beside it.
@@ -89,6 +93,10 @@ impl<A: Application> running::Application for ServedApplication<'_, A> {
 
     fn after_outputs(&mut self, io: &mut running::Io<'_>) {
         self.call(io, A::after_outputs);
+    }
+
+    fn interface_gone(&mut self, io: &mut running::Io<'_>) {
+        self.call(io, A::interface_gone);
     }
 
     fn served(&mut self, ticket: ServiceTicket, result: &Result<ServiceAnswer, ServiceFailure>) {

@@ -33,6 +33,9 @@ pub trait Application {
     /// Outputs that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
     /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
     fn after_outputs(&mut self, _io: &mut Io<'_>) {}
+
+    /// The interface of the line, or its driver, is gone: the run ends with an error. Nothing that is set goes out any more.
+    fn interface_gone(&mut self, _io: &mut Io<'_>) {}
 }
 
 impl<F: FnMut(&mut Io<'_>) -> Next> Application for F {
@@ -144,6 +147,11 @@ impl<'a> Io<'a> {
             true => self.inner.state(device.id),
             false => DeviceState::default(),
         }
+    }
+
+    /// Resets the network: outputs that are locked after a link error (`lock_after_link_error` of a project) are sent again.
+    pub fn reset(&mut self) {
+        self.inner.reset();
     }
 
     /// The state word of the network (PLC-07); 0 when all is well.

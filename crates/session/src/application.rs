@@ -63,6 +63,9 @@ pub trait Application {
     /// A service that [`Io::serve`] has begun is done.
     fn served(&mut self, _ticket: ServiceTicket, _result: &Result<ServiceAnswer, ServiceFailure>) {}
 
+    /// The interface of the line, or its driver, is gone: the run ends. Nothing that is set goes out any more.
+    fn interface_gone(&mut self, _io: &mut Io<'_>) {}
+
     /// Whether it gives outputs at all. One that does not is not watched for being late.
     fn is_idle(&self) -> bool {
         false
@@ -172,6 +175,11 @@ impl Io<'_> {
     #[must_use]
     pub fn network_state(&self) -> NetworkState {
         self.main.network_status().map_or_else(NetworkState::default, NetworkStatus::network_state)
+    }
+
+    /// Resets the network: outputs that are locked after a link error (`lock_after_link_error` of a project) are sent again.
+    pub fn reset(&mut self) {
+        self.main.reset();
     }
 
     /// How many SubDevices are there, of those that are planned (PLC-08).

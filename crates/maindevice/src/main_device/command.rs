@@ -101,7 +101,9 @@ impl MainDevice {
         cyclic.serve(mailboxes.clone());
         cyclic.lead_reference(follows, self.options.clock_epoch);
         cyclic.lead_group(self.lead.clone());
-        let network_status = NetworkStatus::new(&plan);
+        let mut network_status = NetworkStatus::new(&plan);
+        network_status.begin_reset();
+        self.cards.locked = false;
         self.running = Some(RunningPlan { cyclic, plan, device_table, mailboxes, network_status });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
@@ -139,6 +141,15 @@ impl MainDevice {
         drop(device_table);
         self.handle_timeout(now);
         asked
+    }
+
+    /// Whether all SubDevices of the running plan are where they shall be.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| {
+            let device_table = lock(&running.device_table);
+            running.plan.devices.iter().all(|device| device_table.has_reached(device.id))
+        })
     }
 
     /// Lets SubDevices go beyond the state at which [`Options::hold_at`](crate::Options::hold_at)

@@ -6,7 +6,9 @@ use linesman_proto::time::{DcTime, Instant};
 
 use super::MainDevice;
 use crate::cyclic::{OutsideTime, TaskTimes};
+use crate::executor::lock;
 use crate::network_group::NetworkGroup;
+use crate::supervisor::BringUpTimes;
 
 impl MainDevice {
     /// The time of the network at a time of the run (ns since 2000): that which the reference clock has when a frame
@@ -17,6 +19,12 @@ impl MainDevice {
         let by_host = || DcTime(self.options.clock_epoch.0.wrapping_add(at.as_nanos()));
         let known = self.running.as_ref().and_then(|running| running.cyclic.network_time(at));
         known.unwrap_or_else(by_host)
+    }
+
+    /// What bringing up the running plan took so far; `None` unless one is running.
+    #[must_use]
+    pub fn bring_up_times(&self) -> Option<BringUpTimes> {
+        self.running.as_ref().and_then(|running| lock(&running.device_table).times().cloned())
     }
 
     /// The three times of a task at `now`, by [`MainDevice::network_time`]: when its cycle began, the last base tick,

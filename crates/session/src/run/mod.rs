@@ -152,6 +152,15 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
         Io { main, now, missed, withheld: self.withheld, old: false }
     }
 
+    /// The interface of the line is gone: the application learns of it.
+    pub fn interface_gone(&mut self, now: Instant, main: &mut MainDevice) {
+        if self.plan.is_some() {
+            let missed = main.statistics().cycles_missed;
+            let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
+            self.application.interface_gone(&mut io);
+        }
+    }
+
     /// True while outputs are withheld because they were not given in time.
     #[must_use]
     pub const fn is_withheld(&self) -> bool {
