@@ -4,9 +4,10 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use linesman_maindevice::service::{ServiceAnswer, ServiceFailure, ServiceTicket};
+use linesman_proto::time::Instant;
 use linesman_runtime::run as running;
 use linesman_runtime::run::report::RunReport;
-use linesman_runtime::run::{Next, RunOutcome};
+use linesman_runtime::run::{Next, RunOutcome, StartTime};
 
 use crate::Error;
 use crate::handle::PlanId;
@@ -39,12 +40,20 @@ impl Handoff {
 pub(crate) struct Borrowed<'a, A>(pub(crate) &'a mut A);
 
 impl<A: Application> Application for Borrowed<'_, A> {
+    fn start_time(&mut self, now: Instant) -> StartTime {
+        self.0.start_time(now)
+    }
+
     fn cycle(&mut self, io: &mut Io<'_>) -> Next {
         self.0.cycle(io)
     }
 
     fn after_outputs(&mut self, io: &mut Io<'_>) {
         self.0.after_outputs(io);
+    }
+
+    fn interface_gone(&mut self, io: &mut Io<'_>) {
+        self.0.interface_gone(io);
     }
 }
 
@@ -72,6 +81,10 @@ impl<A: Application> ServedApplication<'_, A> {
 }
 
 impl<A: Application> running::Application for ServedApplication<'_, A> {
+    fn start_time(&mut self, now: Instant) -> StartTime {
+        self.application.start_time(now)
+    }
+
     fn cycle(&mut self, io: &mut running::Io<'_>) -> Next {
         self.orders.take(io);
         let next = self.call(io, A::cycle);
@@ -80,6 +93,10 @@ impl<A: Application> running::Application for ServedApplication<'_, A> {
 
     fn after_outputs(&mut self, io: &mut running::Io<'_>) {
         self.call(io, A::after_outputs);
+    }
+
+    fn interface_gone(&mut self, io: &mut running::Io<'_>) {
+        self.call(io, A::interface_gone);
     }
 
     fn served(&mut self, ticket: ServiceTicket, result: &Result<ServiceAnswer, ServiceFailure>) {

@@ -4,7 +4,7 @@ use linesman_maindevice::{FrameStatus, OutsideTime, Quality, Statistics, TaskTim
 use linesman_proto::state::{DeviceState, NetworkState};
 use linesman_proto::time::{DcTime, Instant};
 use linesman_runtime::run as running;
-pub use linesman_runtime::run::Next;
+pub use linesman_runtime::run::{Next, StartTime};
 use linesman_session::image::Value;
 
 use crate::application::Handoff;
@@ -14,6 +14,14 @@ use crate::record::{InputRecord, InputsOf, OutputRecord, OutputsOf};
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
 pub trait Application {
+    /// The time that the network starts in, where its project has `time_source = "program"`; `now` is the time of the run.
+    /// Asked before the first cycle, again and again while it is [awaited](StartTime::Awaited), for 60 s at most. With the
+    /// time of an upper network, told here and in each cycle by [`Io::tell_outside_time`], the network is a clocked
+    /// SubDevice of that: it has its time and its phase.
+    fn start_time(&mut self, _now: Instant) -> StartTime {
+        StartTime::OfHost
+    }
+
     /// One cycle. Where the task exchanges at its begin, it is called when the frames are back: inputs are
     /// fresh, outputs leave at the next begin, whenever this returns. Where it exchanges at its end
     /// ([`RunOptions::exchange_at_end`](crate::RunOptions::exchange_at_end)), it is called when the cycle begins:
@@ -25,6 +33,9 @@ pub trait Application {
     /// Outputs that it sets leave with the next cycle, unless that sets them anew. Of a task that exchanges
     /// at its begin it is never called: there `cycle` itself runs after the outputs went out.
     fn after_outputs(&mut self, _io: &mut Io<'_>) {}
+
+    /// The interface of the line, or its driver, is gone: the run ends with an error. Nothing that is set goes out any more.
+    fn interface_gone(&mut self, _io: &mut Io<'_>) {}
 }
 
 impl<F: FnMut(&mut Io<'_>) -> Next> Application for F {
@@ -136,6 +147,11 @@ impl<'a> Io<'a> {
             true => self.inner.state(device.id),
             false => DeviceState::default(),
         }
+    }
+
+    /// Resets the network: outputs that are locked after a link error (`lock_after_link_error` of a project) are sent again.
+    pub fn reset(&mut self) {
+        self.inner.reset();
     }
 
     /// The state word of the network (PLC-07); 0 when all is well.

@@ -94,7 +94,7 @@ mod virtual_wire;
 
 pub use error::Error;
 pub use handle::{DeviceHandle, Input, Output, PlanId};
-pub use io::{Application, Io, Next};
+pub use io::{Application, Io, Next, StartTime};
 pub use linesman_config::fault::{Class, FaultName};
 pub use linesman_config::inventory::{self, Inventory};
 pub use linesman_config::plan::Plan as PlanData;

@@ -5,6 +5,7 @@ use std::sync::mpsc::Receiver;
 
 use linesman_diagnosis::Event;
 use linesman_link::error::LinkError;
+use linesman_proto::time::DcTime;
 use linesman_runtime::run::report::RunReport;
 use linesman_runtime::run::{Next, Note, StartedRun};
 use linesman_runtime::transport::Transport;
@@ -84,6 +85,15 @@ impl<'a> SteppedRun<'a> {
         Some(Io::new(started.io(), self.plan, &self.handoff))
     }
 
+    /// Tells a time outside that is `time` now, where the project has `time_source = "program"`. Before the first
+    /// [`cycle`](Self::cycle) it is the time that the clocks are set to: that of an upper network, told on by
+    /// [`Io::tell_outside_time`] in each cycle, makes this network a clocked SubDevice of that.
+    pub fn tell_outside_time(&mut self, time: DcTime) {
+        if let Some(started) = &mut self.started {
+            started.io().tell_outside_time(time);
+        }
+    }
+
     /// Changes of findings since this was asked last: those that opened, were confirmed, or closed. Empty
     /// unless the run is [diagnosed](crate::RunOptions::diagnosed).
     pub fn findings(&self) -> impl Iterator<Item = Event> {
@@ -95,6 +105,7 @@ impl<'a> SteppedRun<'a> {
             | Note::Host(_)
             | Note::Missed(..)
             | Note::Failed(_)
+            | Note::AwaitsTime(..)
             | Note::Leaving(_) => None,
         })
     }

@@ -367,6 +367,10 @@ pub enum Event {
         /// Index of the task in the plan.
         task: usize,
     },
+    /// The line has lost its last link, and the plan has its outputs withheld until the network is reset.
+    OutputsLocked,
+    /// The network is being reset: outputs that were locked are sent again.
+    ResetBegun,
     /// A SubDevice reports an error on its own account.
     Emergency {
         /// Which.

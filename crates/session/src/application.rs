@@ -19,9 +19,27 @@ pub enum Next {
     Stop,
 }
 
+/// Time of a network when it starts, where its plan says that a program tells it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum StartTime {
+    /// That of this computer: the network begins in a time of its own.
+    OfHost,
+    /// Not known yet: the start waits.
+    Awaited,
+    /// The time outside at this moment (ns since 2000): the network begins in it.
+    Told(DcTime),
+}
+
 /// A program that is called once a cycle. It must not wait for anything: while it runs, no frame is
 /// sent.
 pub trait Application {
+    /// The time that the network starts in, where its plan has it follow a time that a program tells
+    /// ([`TimeSource::Program`](linesman_config::plan::TimeSource)). Asked before [`begin`](Self::begin), again and again
+    /// while it is awaited, for [`TIME_PATIENCE`](crate::TIME_PATIENCE) at most.
+    fn start_time(&mut self, _now: Instant) -> StartTime {
+        StartTime::OfHost
+    }
+
     /// The line is about to be started with this plan.
     ///
     /// # Errors
@@ -44,6 +62,9 @@ pub trait Application {
 
     /// A service that [`Io::serve`] has begun is done.
     fn served(&mut self, _ticket: ServiceTicket, _result: &Result<ServiceAnswer, ServiceFailure>) {}
+
+    /// The interface of the line, or its driver, is gone: the run ends. Nothing that is set goes out any more.
+    fn interface_gone(&mut self, _io: &mut Io<'_>) {}
 
     /// Whether it gives outputs at all. One that does not is not watched for being late.
     fn is_idle(&self) -> bool {
@@ -154,6 +175,11 @@ impl Io<'_> {
     #[must_use]
     pub fn network_state(&self) -> NetworkState {
         self.main.network_status().map_or_else(NetworkState::default, NetworkStatus::network_state)
+    }
+
+    /// Resets the network: outputs that are locked after a link error (`lock_after_link_error` of a project) are sent again.
+    pub fn reset(&mut self) {
+        self.main.reset();
     }
 
     /// How many SubDevices are there, of those that are planned (PLC-08).

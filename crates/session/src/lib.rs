@@ -24,7 +24,7 @@ pub mod segment_line;
 pub mod session;
 pub mod transport;
 
-pub use application::{Application, Idle, Io, Next};
+pub use application::{Application, Idle, Io, Next, StartTime};
 pub use diagnosis::DiagnosisInput;
-pub use run::{MakePlan, PlanRun, PlanSource, RunEvent, RunFailure};
+pub use run::{MakePlan, PlanRun, PlanSource, RunEvent, RunFailure, TIME_PATIENCE};
 pub use session::{Session, SessionHooks};

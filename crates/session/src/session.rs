@@ -1,6 +1,6 @@
 //! The session itself: a MainDevice, and the hooks that tell it what to do and see its frames.
 
-use linesman_diagnosis::{Direction, FrameSeen, HostObservation};
+use linesman_diagnosis::{Direction, FrameSeen, HostEvent, HostObservation};
 use linesman_maindevice::{Event, MainDevice, Transmit};
 use linesman_proto::address::Path;
 use linesman_proto::time::{Instant, Span};
@@ -143,6 +143,15 @@ impl<H: SessionHooks> Session<H> {
 
     /// Takes what the host noticed.
     pub fn handle_host(&mut self, observation: &HostObservation) {
+        match observation.what {
+            HostEvent::Carrier(carrier) => self.main.handle_carrier(observation.path, carrier),
+            HostEvent::SendFailures(_) => self.main.handle_send_failure(observation.time),
+            HostEvent::CardErrors { .. }
+            | HostEvent::CardDrops(_)
+            | HostEvent::SocketDrops(_)
+            | HostEvent::Late(_)
+            | HostEvent::ClockStep(_) => {}
+        }
         self.hooks.host(observation);
     }
 
@@ -171,7 +180,7 @@ impl<H: SessionHooks> Session<H> {
     pub fn take_in<L: Transport>(&mut self, now: Instant, line: &mut L) -> Result<bool, L::Error> {
         // Frames are judged at the time at which they are taken in, not at that of their stamp.
         line.receive(now, &mut self.intake(now))?;
-        line.look_at_host(now, &mut |observation| self.hooks.host(observation))?;
+        line.look_at_host(now, &mut |observation| self.handle_host(observation))?;
         if let Some(due) = self.main.poll_cycle_timeout()
             && due <= now
             && !self.hooks.is_paused()

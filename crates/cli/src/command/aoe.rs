@@ -139,8 +139,8 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
 /// The command, and the data that ask it.
 fn asked(action: &Action) -> Result<(AdsCommand, Vec<u8>), Failure> {
     let written = |text: &str| {
-        bytes(text).ok_or_else(|| {
-            let reason = format!("`{text}` is no row of bytes");
+        bytes(text).filter(|data| !data.is_empty()).ok_or_else(|| {
+            let reason = format!("`{text}` is no row of bytes: expected one at least");
             Failure::new(
                 reason,
                 "write pairs of hexadecimal digits in the order of the line: 01 02 FF",

@@ -62,6 +62,9 @@ pub(crate) struct Arguments {
     /// Let counts begin at 0 first. Errors: the registers too, which are read and cleared in one go
     #[arg(long, value_name = "WHAT", value_enum)]
     clear: Option<What>,
+    /// Reset the network first: outputs that are locked after a link error are sent again
+    #[arg(long)]
+    reset: bool,
     /// Keep the report in a file, to be shown again later
     #[arg(long, value_name = "FILE.json")]
     save: Option<PathBuf>,
@@ -107,6 +110,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         Some(path) => Some(path.clone()),
         None => is_socket(&place).then(|| PathBuf::from(&place)),
     };
+    if arguments.reset && socket.is_none() {
+        return Err(refuse_reset(&place));
+    }
     let report = if let Some(path) = socket {
         driven(&path, arguments, output)?
     } else if Path::new(&place).extension().is_some_and(|ending| ending == "json") {
@@ -173,6 +179,9 @@ fn driven(
     if let Some(what) = arguments.clear {
         clear(path, what, output)?;
     }
+    if arguments.reset {
+        reset(path, output)?;
+    }
     let pace = Pace { interval: interval(arguments), lasts: lasts(arguments) };
     if !arguments.live {
         if let Some(lasts) = pace.lasts {
@@ -221,6 +230,21 @@ fn clear(path: &Path, what: What, output: &Output) -> Result<(), Failure> {
     }
     let answer = service::clear(path, what.errors(), what.frames());
     answer.map(drop).map_err(|error| silent(path, &error))
+}
+
+/// Ends what keeps outputs locked.
+fn reset(path: &Path, output: &Output) -> Result<(), Failure> {
+    let answer = service::reset(path).map_err(|error| silent(path, &error))?;
+    if let Some(why) = answer.error {
+        output.warn(&format!("nothing was reset: {why}"));
+    }
+    Ok(())
+}
+
+/// What only a MainDevice that drives the line can do.
+fn refuse_reset(place: &str) -> Failure {
+    let reason = format!("{place}: no MainDevice drives it, so there is nothing to reset");
+    Failure::new(reason, "name the socket of `linesman run --on NIC --control SOCKET`")
 }
 
 /// A report that was kept.

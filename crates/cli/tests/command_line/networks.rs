@@ -131,6 +131,59 @@ impl Drop for Ended {
     }
 }
 
+/// Writes whose time the network of a project has.
+fn set_time_source(networks: &Networks, no: usize, source: &str) {
+    let project = networks.path(&format!("p{no}.toml"));
+    let saved = fs::read_to_string(&project).unwrap();
+    let network = format!("[network]\ntime_source = \"{source}\"\n\n[[device]]");
+    let with = saved.replacen("[[device]]", &network, 1);
+    fs::write(&project, with).unwrap();
+}
+
+// proves: DC-18
+#[test]
+fn network_below_an_upper_one_waits_for_its_time_and_begins_in_it_wherever_it_is_named() {
+    for (below, upper) in [(0, 1), (1, 0)] {
+        let networks = Networks::new(&[(-40.0, true), (35.0, true)]);
+        set_time_source(&networks, below, "upper-network");
+        let (shown, groups) = networks.run("45");
+        let lead = networks.line(upper);
+        assert_eq!(
+            (&groups[upper]["leads"], &groups[below]["leads"]),
+            (&true.into(), &false.into())
+        );
+        assert_eq!(groups[below]["lead"], lead.as_str());
+        let ahead = groups[below]["ahead_ns"].as_i64().unwrap();
+        assert!(ahead.abs() < 500, "{ahead} ns: {shown}");
+        // It begins in that time, and does not drift into it.
+        let (shown, groups) = networks.run("3");
+        let ahead = groups[below]["ahead_ns"].as_i64().unwrap();
+        assert!(ahead.abs() < 5_000, "{ahead} ns: {shown}");
+        let text = linesman(networks.words(&["--seconds", "3"]));
+        let waits = "waits for the time of the upper network to begin in it, 60.000 s at most";
+        let of = format!("{}: ", networks.line(below));
+        let told: Vec<_> = text.stdout.lines().filter(|line| line.contains(waits)).collect();
+        assert!(told.len() == 1 && told[0].starts_with(&of), "{}", text.stdout);
+    }
+}
+
+#[test]
+fn network_below_an_upper_one_that_never_tells_its_time_is_not_started() {
+    // The other one has no clocks.
+    let networks = Networks::new(&[(-40.0, false), (35.0, true)]);
+    set_time_source(&networks, 1, "upper-network");
+    let run = linesman(networks.words(&["--seconds", "100"]));
+    assert_eq!(run.status, 2, "{}", run.all());
+    let told = "the upper network has told no time for 60 s";
+    assert!(run.stderr.contains(told), "{}", run.all());
+    assert!(run.stderr.contains("look whether the network that leads is up"), "{}", run.stderr);
+    // Alone there is none above it.
+    let (project, on) = (networks.path("p1.toml"), networks.line(1));
+    let alone = linesman(["run", &project, "--on", &on, "--seconds", "3"]);
+    assert_eq!(alone.status, 2, "{}", alone.all());
+    assert!(alone.stderr.contains("this run has no other network"), "{}", alone.stderr);
+}
+
 // proves: DC-12
 #[test]
 fn online_tells_which_network_leads_and_how_far_the_others_are_ahead() {

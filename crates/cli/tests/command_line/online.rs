@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use crate::support::running::{PLANT, Running};
+use crate::support::running::{PLANT, Running, project_of};
 use crate::support::{assert_valid, linesman};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -357,8 +357,37 @@ const RING: &str = "\
 [[fault]]\nkind = \"link-open\"\nat = \"maindevice.A-K1.A\"\nfrom_ms = 2500\nto_ms = 5500\n\
 [[fault]]\nkind = \"link-open\"\nat = \"K3.C-maindevice.B\"\nfrom_ms = 8000\nto_ms = 11000\n";
 
+// proves: PLC-07 partial: the lock after a link error and its reset
+#[test]
+fn network_that_is_locked_after_a_link_error_goes_on_when_it_is_reset() {
+    let lost = format!(
+        "{PLANT}[[fault]]\nkind = \"link-open\"\nat = \"maindevice-K1.A\"\nfrom_ms = 2500\nto_ms = 4000\n"
+    );
+    let project = project_of(PLANT, "");
+    let network = "[network]\nlock_after_link_error = true\n\n[[device]]";
+    let locks = project.replacen("[[device]]", network, 1);
+    let running = Running::with(&lost, &[("project.toml", &locks)]);
+    let word = |report: &Value| number(&report["state"]["word"]);
+    let report = running.until("is locked", |report| word(report) & 0x0003 == 0x0003);
+    let text = report["state"]["text"].as_str().unwrap();
+    assert!(text.contains("I/O locked after link error (reset required)"), "{text}");
+    // The link is back, and all wait in SAFEOP.
+    running.until("waits", |report| word(report) == 0x0402);
+    let reset = linesman(["online", &running.socket(), "--reset", "--json"]);
+    assert_valid(&reset.json(), "online");
+    assert_eq!(word(&reset.json()) & 0x0002, 0, "{}", reset.all());
+    running.until("is well", |report| word(report) == 0);
+    // A line that nobody drives has nothing to be reset.
+    let folder = TempDir::new().unwrap();
+    let plant = folder.path().join("plant.toml");
+    std::fs::write(&plant, PLANT).unwrap();
+    let alone = linesman(["online", &format!("sim:{}", plant.display()), "--reset"]);
+    assert_eq!(alone.status, 2, "{}", alone.all());
+    assert!(alone.stderr.contains("nothing to reset"), "{}", alone.stderr);
+}
+
 // S0 L2573-2593: what is wrong with the network, a bit for each; 0 is well.
-// proves: PLC-07 partial: the bits that a line can bring about; clocks are in clocks.rs, locks and resets of the I/O are not ours
+// proves: PLC-07 partial: the bits that a line can bring about; clocks are in clocks.rs
 #[test]
 fn the_word_of_the_network_says_what_is_wrong() {
     let running = Running::start(RING);

@@ -274,6 +274,15 @@ fn subdevice_is_asked_by_ads_and_given_a_net_id() {
     assert!(reason.contains("C1 (EL6692)") && reason.contains("0x70C not found"), "{reason}");
     // What speaks no ADS, and what is no row of bytes.
     assert_eq!(plant.json("aoe", &["A1", "info"], "refusal", 1)["kind"], "mailbox-error");
+    for nothing in ["0x", "", " "] {
+        let none = plant.run("aoe", &["C1", "write", "0xF302", "0x10F10002", nothing]);
+        assert_eq!(none.status, 2, "{nothing:?}: {}", none.all());
+        assert!(
+            none.stderr.contains("is no row of bytes: expected one at least"),
+            "{}",
+            none.stderr
+        );
+    }
     let wrong = plant.run("aoe", &["C1", "write", "0xF302", "0x10F10002", "5"]);
     assert_eq!(wrong.status, 2, "{}", wrong.all());
 }

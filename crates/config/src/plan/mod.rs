@@ -109,6 +109,8 @@ pub struct Plan {
     pub base_tick: Span,
     /// Ports whose link was lost stay closed until they are ordered to open (JCT-12).
     pub ports_open_by_order: bool,
+    /// Once the line has no link any more, outputs are withheld until the network is reset (PLC-07).
+    pub lock_after_link_error: bool,
     /// Groups that join and leave while the network runs.
     pub groups: Vec<HotConnectGroup>,
     /// What is said of the clocks of its ring.
@@ -226,6 +228,7 @@ impl Plan {
             time_stamps: None,
             base_tick: Span::ms(1),
             ports_open_by_order: false,
+            lock_after_link_error: false,
             groups: Vec::new(),
             ring_clocks: RingClocks { port_multiplier: None, need_port_multiplier: false },
         }

@@ -26,6 +26,9 @@ pub enum TimeSource {
     Program,
     /// One that a SubDevice tells: the reference clock is led to its speed.
     Device(DeviceId),
+    /// That of the network that leads the others of the same process: the clocks are set to it at the start, and the
+    /// reference clock is led to it.
+    UpperNetwork,
 }
 
 /// What the time stamps of a SubDevice are read from, in the inputs of the process image.
@@ -175,6 +178,7 @@ impl Plan {
             TimeSource::ReferenceClock
             | TimeSource::Host
             | TimeSource::Program
+            | TimeSource::UpperNetwork
             | TimeSource::Device(_) => return None,
         };
         let (severity, name) = (Severity::Warning, "time-source");

@@ -61,6 +61,9 @@ pub struct Network {
     /// A port whose link was lost stays closed when the link is back, until the MainDevice has prepared the
     /// section behind it and orders it to open; else it opens by itself, at once.
     pub ports_open_by_order: bool,
+    /// When no card of the line has a link any more, outputs are withheld and SubDevices kept below OP until the network is
+    /// reset (`linesman online SOCKET --reset`); else they go on as soon as SubDevices answer again.
+    pub lock_after_link_error: bool,
 }
 
 impl Default for Network {
@@ -82,6 +85,7 @@ impl Default for Network {
             time_source: None,
             time_device: None,
             ports_open_by_order: false,
+            lock_after_link_error: false,
         }
     }
 }
@@ -180,6 +184,7 @@ impl Network {
             base_tick: Span::us(u64::from(self.base_time_us)),
             sync_window: self.sync_window_ns.map(|ns| Span::ns(u64::from(ns))),
             ports_open_by_order: self.ports_open_by_order,
+            lock_after_link_error: self.lock_after_link_error,
             ..PlanOptions::default()
         }
     }

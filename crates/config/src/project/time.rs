@@ -20,6 +20,8 @@ pub enum TimeChoice {
     Program,
     /// One that a device tells: a bridge to another network, or a terminal for IEEE 1588.
     Device,
+    /// That of the network that leads the others of the same run: the start waits for it.
+    UpperNetwork,
 }
 
 /// The form of the time stamps of a bridge or of a terminal for IEEE 1588.
@@ -169,6 +171,7 @@ impl Project {
             (Some(TimeChoice::ReferenceClock), None) => Some(TimeSource::ReferenceClock),
             (Some(TimeChoice::Host), None) => Some(TimeSource::Host),
             (Some(TimeChoice::Program), None) => Some(TimeSource::Program),
+            (Some(TimeChoice::UpperNetwork), None) => Some(TimeSource::UpperNetwork),
             (Some(TimeChoice::Device) | None, None) => None,
         }
     }

@@ -28,7 +28,10 @@ impl Lab {
                 RunEvent::Scanned(inventory) => self.handle_event(Event::Scanned(inventory)),
                 RunEvent::MainDevice(_, event) => self.handle_event(*event),
                 RunEvent::Finding(event) => self.keep_finding_event(*event),
-                RunEvent::Planned(_) | RunEvent::Host(_) | RunEvent::Leaving(_) => {}
+                RunEvent::Planned(_)
+                | RunEvent::Host(_)
+                | RunEvent::AwaitsTime(..)
+                | RunEvent::Leaving(_) => {}
             }
         }
         let now = self.now();

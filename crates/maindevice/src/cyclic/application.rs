@@ -69,6 +69,11 @@ impl Application {
         }
     }
 
+    /// True while its outputs are withheld because it is late.
+    pub(super) const fn is_withheld(&self) -> bool {
+        self.withheld
+    }
+
     /// It gives the outputs of this task.
     #[inline]
     pub(super) const fn give(&mut self) {

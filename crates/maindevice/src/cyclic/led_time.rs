@@ -26,6 +26,9 @@ const FIRST_PAIRS: u32 = 512;
 const PROPORTIONAL_PLACES: u32 = 8;
 /// And so much is learnt of the speed: 1/2^18 a cycle.
 const INTEGRAL_PLACES: u32 = 18;
+/// After so many pairs a distance that is acted upon in part only has to have become smaller: else the speed was taken while
+/// the network had not found its own yet, and is taken anew.
+const WORK_OFF_PAIRS: u32 = 4_096;
 /// More of the distance than this is not acted upon at once, in ns: the reference clock cannot follow it.
 const MOST: i64 = 5_000;
 /// A clock outside that is further off than this was set anew, in ns.
@@ -82,6 +85,8 @@ struct OutsidePairs {
     kept: Option<i64>,
     latest: Option<OutsideTime>,
     steady: u32,
+    /// The distance left to work off when it was looked at last, in ns, and pairs since.
+    left: (u64, u32),
     /// The internal time of the latest pair, which does not count twice.
     internal: Option<u64>,
 }
@@ -108,11 +113,12 @@ impl LedTime {
         epoch: DcTime,
     ) -> Option<Self> {
         let source = match (wanted, follows) {
-            (Some(TimeSource::ReferenceClock), _) | (None, None) => return None,
+            (Some(TimeSource::ReferenceClock), _)
+            | (None | Some(TimeSource::UpperNetwork), None) => return None,
             (Some(TimeSource::Host), _) => LedBy::Host(epoch),
             (Some(TimeSource::Program), _) => LedBy::Outside(None),
             (Some(TimeSource::Device(_)), _) => LedBy::Outside(Some(stamps?)),
-            (None, Some(group)) => LedBy::Group(group),
+            (None | Some(TimeSource::UpperNetwork), Some(group)) => LedBy::Group(group),
         };
         let (offset, held, ahead_of_group) = (None, None, None);
         Some(Self { source, offset, held, pairs: OutsidePairs::default(), ahead_of_group })
@@ -198,6 +204,10 @@ impl LedTime {
         }
         let acted = i128::from(deviation.clamp(-MOST, MOST));
         held.add((acted << SPEED_PLACES) >> PROPORTIONAL_PLACES);
+        if pairs.is_stuck(deviation.unsigned_abs()) {
+            (pairs.first, pairs.count) = (None, 0);
+            return;
+        }
         if deviation.abs() < MOST {
             let cycle = i128::from(cycle.as_nanos().max(1));
             held.add_speed(((acted << (SPEED_PLACES - INTEGRAL_PLACES)) / cycle) as i64);
@@ -217,6 +227,24 @@ impl LedTime {
         }
         held.advance(departed);
         Some(held.time)
+    }
+}
+
+impl OutsidePairs {
+    /// True if a distance is no smaller than it was [`WORK_OFF_PAIRS`] before.
+    fn is_stuck(&mut self, distance: u64) -> bool {
+        let (before, passed) = self.left;
+        if distance < MOST as u64 {
+            self.left = (u64::MAX, 0);
+            return false;
+        }
+        self.left.1 = passed + 1;
+        if passed < WORK_OFF_PAIRS {
+            return false;
+        }
+        self.left = (distance, 0);
+        // What is left after the first look is the begin.
+        before != 0 && distance >= before
     }
 }
 
@@ -306,6 +334,26 @@ mod tests {
         }
         let far = taken(2_000_000);
         assert!(far.in_step && far.ahead_ns > 1_900_000, "only its speed: {far:?}");
+    }
+
+    #[test]
+    fn speed_that_was_taken_too_early_is_taken_anew() {
+        let mut led = LedTime::new(Some(TimeSource::Program), None, None, DcTime(0)).unwrap();
+        let (mut network, mut reference) = (NetworkTime::default(), 5_000_000_i64);
+        for number in 1..=60_000_i64 {
+            let at = Instant::from_nanos(number as u64 * 1_000_000);
+            reference += 1_000_020;
+            let outside = 5_000_000 + number * 999_970;
+            // While the first pairs come, the speed of the network is not what it is later.
+            let ppm = if number < 1_000 { 60 } else { 20 };
+            network.take(at, reference as u64, ppm * (1 << SPEED_PLACES) / 1_000_000);
+            if let Some(time) = led.time(at, &network, &[], CYCLE) {
+                reference = time as i64;
+            }
+            led.take_pair(reference as u64, outside - reference, CYCLE);
+        }
+        let OutsideTime { ahead_ns, in_step, .. } = led.outside().expect("pairs were told");
+        assert!(in_step && ahead_ns.abs() < 100, "{ahead_ns} ns");
     }
 
     #[test]

@@ -108,6 +108,8 @@ pub(crate) struct Cyclic {
     deadline: Instant,
     /// How often the application has given the outputs of all tasks.
     given: u64,
+    /// Outputs of all tasks are withheld after a link error.
+    locked: bool,
     /// Frames lost in a row, by task; whether there are any.
     lost: Vec<u64>,
     losing: bool,
@@ -156,6 +158,7 @@ impl Cyclic {
             left: 0..0,
             deadline: now,
             given: 0,
+            locked: false,
             lost: vec![0; plan.tasks.len()],
             losing: false,
             least: Presence::none(plan.devices.len()),

@@ -140,12 +140,24 @@ impl Cyclic {
             if let Some(judged) = batch.application.begin_cycle(self.given) {
                 let task = batch.task;
                 judged.tell(task, statistics, events);
-                if judged.changed {
+                if judged.changed && !self.locked {
                     self.withhold(task, judged.withheld);
                 }
             }
         }
         Some(())
+    }
+
+    /// Withholds the outputs of all tasks, or ends that: those of an application that is late stay withheld.
+    #[cold]
+    pub(crate) fn set_locked(&mut self, locked: bool) {
+        self.locked = locked;
+        let late = |one: &FrameBatch| one.begins && one.application.is_withheld();
+        let late: Vec<usize> =
+            self.batches.iter().filter(|one| late(one)).map(|one| one.task).collect();
+        for task in 0..self.plan.tasks.len() {
+            self.withhold(task, locked || late.contains(&task));
+        }
     }
 
     /// Outputs of a task must not be sent as fresh ones from now on, or may again.

@@ -153,6 +153,8 @@ impl Event {
             | Self::Probed { .. }
             | Self::OutputsWithheld { .. }
             | Self::OutputsResumed { .. }
+            | Self::OutputsLocked
+            | Self::ResetBegun
             | Self::Stopped => Vec::new(),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use linesman_config::plan::Plan;
+use linesman_config::plan::{Plan, TimeSource};
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
@@ -101,21 +101,26 @@ impl MainDevice {
         cyclic.serve(mailboxes.clone());
         cyclic.lead_reference(follows, self.options.clock_epoch);
         cyclic.lead_group(self.lead.clone());
-        let network_status = NetworkStatus::new(&plan);
+        let mut network_status = NetworkStatus::new(&plan);
+        network_status.begin_reset();
+        self.cards.locked = false;
         self.running = Some(RunningPlan { cyclic, plan, device_table, mailboxes, network_status });
         self.acyclic_left = self.options.frames_at_once;
         self.handle_timeout(now);
     }
 
     /// Leads its group, where that has no lead yet; else gives the group that it follows. A network without clocks does
-    /// neither, nor one whose plan says whose time it has.
+    /// neither, nor one whose plan says whose time it has; one below an upper network only follows.
     fn join_group(&mut self, plan: &mut Plan) -> Option<NetworkGroup> {
         let group = self.options.group.as_ref()?;
-        if plan.time_source.is_some() || plan.reference_clock().is_none() {
+        let is_below = plan.time_source == Some(TimeSource::UpperNetwork);
+        if (plan.time_source.is_some() && !is_below) || plan.reference_clock().is_none() {
             self.lead = None;
             return None;
         }
-        if self.lead.is_none() {
+        if is_below {
+            self.lead = None;
+        } else if self.lead.is_none() {
             self.lead = group.lead().map(Arc::new);
         }
         (self.lead.is_none() && plan.add_clock_shift()).then(|| group.clone())
@@ -136,6 +141,15 @@ impl MainDevice {
         drop(device_table);
         self.handle_timeout(now);
         asked
+    }
+
+    /// Whether all SubDevices of the running plan are where they shall be.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| {
+            let device_table = lock(&running.device_table);
+            running.plan.devices.iter().all(|device| device_table.has_reached(device.id))
+        })
     }
 
     /// Lets SubDevices go beyond the state at which [`Options::hold_at`](crate::Options::hold_at)

@@ -2,6 +2,7 @@
 
 mod acyclic_rx;
 mod command;
+mod io_lock;
 mod time;
 
 use std::collections::VecDeque;
@@ -14,6 +15,7 @@ use linesman_proto::frame::FrameView;
 use linesman_proto::frame::size::{BYTE_NS, WIRE_OVERHEAD};
 use linesman_proto::time::Instant;
 
+use self::io_lock::CardStates;
 use crate::cyclic::{Cyclic, FrameStatus, Quality};
 use crate::event::Event;
 use crate::exchange::{
@@ -27,7 +29,7 @@ use crate::options::Options;
 use crate::procedure::scan::ScanCache;
 use crate::service::ServiceOnly;
 use crate::statistics::Statistics;
-use crate::supervisor::{BringUpTimes, DeviceTable};
+use crate::supervisor::DeviceTable;
 use crate::watch::NetworkStatus;
 
 pub use command::ProbeRequest;
@@ -58,6 +60,8 @@ pub struct MainDevice {
     lead: Option<Arc<GroupLead>>,
     /// Until it begins, those that come behind it in its group wait.
     turn: Option<GroupTurn>,
+    /// The cards, and whether outputs are locked.
+    cards: CardStates,
     /// Requests on their way from procedures to the exchange.
     submitted: VecDeque<(Ticket, Request)>,
     /// How many frames of procedures may still go out in this cycle.
@@ -94,6 +98,7 @@ impl MainDevice {
             next_service: 0,
             lead: None,
             turn,
+            cards: CardStates::default(),
             submitted: VecDeque::new(),
             acyclic_left: 0,
         }
@@ -242,6 +247,9 @@ impl MainDevice {
         if self.exchange.earliest() <= now {
             self.expire(now);
         }
+        if self.cards.is_forgiven(now) {
+            self.forgive_send_failures();
+        }
         self.work();
     }
 
@@ -366,21 +374,6 @@ impl MainDevice {
     #[must_use]
     pub fn is_running(&self) -> bool {
         self.running.is_some()
-    }
-
-    /// Whether all SubDevices of the running plan are where they shall be.
-    #[must_use]
-    pub fn is_settled(&self) -> bool {
-        self.running.as_ref().is_some_and(|running| {
-            let device_table = lock(&running.device_table);
-            running.plan.devices.iter().all(|device| device_table.has_reached(device.id))
-        })
-    }
-
-    /// What bringing up the running plan took so far; `None` unless one is running.
-    #[must_use]
-    pub fn bring_up_times(&self) -> Option<BringUpTimes> {
-        self.running.as_ref().and_then(|running| lock(&running.device_table).times().cloned())
     }
 
     /// The outputs of the process image; empty unless a plan is running. Asking for them counts as

@@ -6,7 +6,9 @@ use linesman_proto::time::{DcTime, Instant};
 
 use super::MainDevice;
 use crate::cyclic::{OutsideTime, TaskTimes};
+use crate::executor::lock;
 use crate::network_group::NetworkGroup;
+use crate::supervisor::BringUpTimes;
 
 impl MainDevice {
     /// The time of the network at a time of the run (ns since 2000): that which the reference clock has when a frame
@@ -17,6 +19,12 @@ impl MainDevice {
         let by_host = || DcTime(self.options.clock_epoch.0.wrapping_add(at.as_nanos()));
         let known = self.running.as_ref().and_then(|running| running.cyclic.network_time(at));
         known.unwrap_or_else(by_host)
+    }
+
+    /// What bringing up the running plan took so far; `None` unless one is running.
+    #[must_use]
+    pub fn bring_up_times(&self) -> Option<BringUpTimes> {
+        self.running.as_ref().and_then(|running| lock(&running.device_table).times().cloned())
     }
 
     /// The three times of a task at `now`, by [`MainDevice::network_time`]: when its cycle began, the last base tick,
@@ -40,6 +48,23 @@ impl MainDevice {
     #[must_use]
     pub fn waits_for_group(&self) -> bool {
         self.turn.is_some() && self.options.group.as_ref().is_some_and(NetworkGroup::waits)
+    }
+
+    /// Lets the networks behind it in its group begin, although it has not started yet: it waits for the time of one of them.
+    pub fn give_up_turn(&mut self) {
+        self.turn = None;
+    }
+
+    /// True if this network is in a group with others.
+    #[must_use]
+    pub fn is_in_group(&self) -> bool {
+        self.options.group.is_some()
+    }
+
+    /// True once the network that leads its group has told its time: a network below it that starts now begins in that time.
+    #[must_use]
+    pub fn knows_group_time(&self) -> bool {
+        self.options.group.as_ref().is_some_and(|group| group.is_led() && group.told().is_some())
     }
 
     /// By how many ns the time of this network is ahead of that of the network that leads its group, as its frames have it;

@@ -96,6 +96,8 @@ pub(crate) struct DeviceTable {
     strangers: BTreeSet<(Option<DeviceId>, Identity)>,
     /// No SubDevice goes beyond it for the time being.
     hold: Option<AlState>,
+    /// Outputs are locked after a link error: no SubDevice goes beyond SAFEOP.
+    locked: bool,
     times: Option<BringUpTimes>,
     /// How often clocks were set, and the system time at the start of the run.
     clock_base: Option<(u32, DcTime)>,
@@ -305,10 +307,21 @@ impl DeviceTable {
     pub(crate) fn wanted(&self, id: DeviceId) -> AlState {
         let target = self.devices.get(id.index()).and_then(|live| live.target);
         let target = target.unwrap_or(AlState::Init);
-        match self.hold {
+        match self.limit() {
             // BOOT and INIT are no further than any other state.
             Some(hold) if target != AlState::Boot && target.bits() > hold.bits() => hold,
             Some(_) | None => target,
+        }
+    }
+
+    /// The state beyond which no SubDevice goes.
+    fn limit(&self) -> Option<AlState> {
+        match self.hold {
+            Some(hold) if self.locked && hold.bits() > AlState::SafeOp.bits() => {
+                Some(AlState::SafeOp)
+            }
+            None if self.locked => Some(AlState::SafeOp),
+            hold => hold,
         }
     }
 
@@ -338,6 +351,13 @@ impl DeviceTable {
     /// Nobody goes beyond `hold`; `None`: everybody to the target.
     pub(crate) fn set_hold(&mut self, hold: Option<AlState>) {
         self.hold = hold;
+        self.all_reached = false;
+        self.alert();
+    }
+
+    /// Keeps SubDevices below OP while outputs are locked.
+    pub(crate) fn set_locked(&mut self, locked: bool) {
+        self.locked = locked;
         self.all_reached = false;
         self.alert();
     }

@@ -40,6 +40,8 @@ pub struct WatchedDevice {
     changeable: PortMap<bool>,
     /// It may be absent.
     optional: bool,
+    /// The state that the plan drives it to.
+    target: AlState,
     present: Option<bool>,
     status: Option<AlStatus>,
     code: AlStatusCode,
@@ -66,6 +68,7 @@ impl WatchedDevice {
             planned: PortMap::from_fn(is_planned),
             changeable: PortMap::from_fn(|port| is_changeable(plan, node, port)),
             optional: plan.is_optional(device.id),
+            target: device.target,
             present: None,
             status: None,
             code: AlStatusCode::NO_ERROR,
@@ -170,6 +173,14 @@ impl WatchedDevice {
         ];
         let word = self.state();
         faults.into_iter().any(|bit| word.contains(bit))
+    }
+
+    /// True if nothing is left to be done to bring it up for now: it is in its target state, has refused that, is another one,
+    /// or is not there.
+    pub(super) fn is_up(&self) -> bool {
+        let is_there = self.status.is_some_and(|one| one.state() == StateValue::Known(self.target));
+        let failed = self.init_error || self.wrong_identity || self.present == Some(false);
+        is_there || failed || self.is_excused()
     }
 
     /// Its ports as they were read last.

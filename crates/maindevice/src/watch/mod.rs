@@ -107,13 +107,14 @@ impl Watch {
 
     /// The carrier of a card came or went.
     pub fn handle_carrier(&mut self, now: Instant, card: Path, carrier: bool) {
-        let bit = match card {
-            Path::A => NetworkState::LINK_ERROR,
-            Path::B => NetworkState::REDUNDANCY_LINK_ERROR,
-        };
-        if self.network_status.set(bit, !carrier) {
+        if self.network_status.set_carrier(card, carrier) {
             self.push(wording::carrier(now, card, carrier));
         }
+    }
+
+    /// The line is being brought up.
+    pub fn begin_reset(&mut self) {
+        self.network_status.begin_reset();
     }
 
     /// The card took a frame, or did not.

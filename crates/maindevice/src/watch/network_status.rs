@@ -5,7 +5,7 @@
 //! ([`MainDevice::network_status`](crate::MainDevice::network_status)); [`Watch`](super::Watch) keeps one for people.
 
 use linesman_config::plan::Plan;
-use linesman_proto::address::{DeviceId, WorkingCounter};
+use linesman_proto::address::{DeviceId, Path, WorkingCounter};
 use linesman_proto::state::{AlState, NetworkState, StateValue};
 use linesman_proto::time::Instant;
 
@@ -23,6 +23,8 @@ pub struct NetworkStatus {
     groups: Vec<GroupStatus>,
     /// Bits that do not follow from the SubDevices.
     own: NetworkState,
+    /// No SubDevice answers any more.
+    all_lost: bool,
     responding: Option<WorkingCounter>,
     /// Whose clock is the reference, and how far it is ahead of the host's, in ns.
     network_time: Option<(DeviceId, i64)>,
@@ -35,7 +37,7 @@ impl NetworkStatus {
         let devices = plan.devices.iter().map(|device| WatchedDevice::new(plan, device)).collect();
         let groups = plan.groups.iter().map(GroupStatus::new).collect();
         let own = NetworkState::default();
-        Self { devices, groups, own, responding: None, network_time: None }
+        Self { devices, groups, own, all_lost: false, responding: None, network_time: None }
     }
 
     /// What is known of each SubDevice, by [`DeviceId`].
@@ -140,6 +142,21 @@ impl NetworkStatus {
         self.own != before
     }
 
+    /// A card has a link, or has none. True if that is news.
+    pub fn set_carrier(&mut self, card: Path, carrier: bool) -> bool {
+        let bit = match card {
+            Path::A => NetworkState::LINK_ERROR,
+            Path::B => NetworkState::REDUNDANCY_LINK_ERROR,
+        };
+        self.set(bit, !carrier)
+    }
+
+    /// The network is brought up from now on, anew or for the first time, until each SubDevice is in its target state, has
+    /// refused it, is another one, or is not there.
+    pub fn begin_reset(&mut self) {
+        self.set(NetworkState::RESET, true);
+    }
+
     /// Something happened.
     #[allow(clippy::wildcard_enum_match_arm, reason = "the others are of one SubDevice")]
     pub fn handle_event(&mut self, now: Instant, event: &Event) {
@@ -187,12 +204,32 @@ impl NetworkStatus {
             Event::OutputsResumed { .. } => {
                 self.set(NetworkState::WATCHDOG, false);
             }
+            Event::OutputsLocked => {
+                self.set(NetworkState::LOCKED, true);
+            }
+            Event::ResetBegun => {
+                self.set(NetworkState::LOCKED, false);
+                self.begin_reset();
+            }
             _ => {}
         }
         if let Some(id) = concerned(event)
             && let Some(device) = self.devices.get_mut(id.index())
         {
             device.handle_event(now, event);
+            // The first that is back after all were lost: the whole line is brought up.
+            if device.is_present() == Some(true) {
+                if std::mem::take(&mut self.all_lost) {
+                    self.begin_reset();
+                }
+            } else if matches!(event, Event::DeviceLost { .. }) {
+                self.all_lost = self.devices.iter().all(|one| one.is_present() == Some(false));
+            }
+        }
+        if self.own.contains(NetworkState::RESET)
+            && (matches!(event, Event::AllReached) || self.devices.iter().all(WatchedDevice::is_up))
+        {
+            self.set(NetworkState::RESET, false);
         }
     }
 

@@ -415,6 +415,33 @@ fn the_network_word_sums_up() {
     );
 }
 
+// proves: PLC-07 partial: from events
+#[test]
+fn reset_is_under_way_until_each_subdevice_is_up_or_has_refused() {
+    let mut watch = watch();
+    let word = |watch: &Watch| watch.network_status().network_state().0;
+    let reset = NetworkState::RESET;
+    watch.begin_reset();
+    assert_eq!(word(&watch) & reset, reset, "nothing is known yet");
+    for id in 0..6 {
+        watch.handle_event(at(0), &state(id, AlState::Op, false, 0));
+        assert_eq!(word(&watch) & reset, reset);
+    }
+    watch.handle_event(at(1), &Event::DeviceLost { id: DeviceId(6) });
+    assert_eq!(word(&watch) & reset, 0, "the last one is not there");
+    for id in 0..6 {
+        watch.handle_event(at(2), &Event::DeviceLost { id: DeviceId(id) });
+    }
+    watch.handle_event(at(2), &Event::OutputsLocked);
+    assert_eq!(word(&watch) & (reset | NetworkState::LOCKED), NetworkState::LOCKED);
+    watch.handle_event(at(3), &state(0, AlState::PreOp, false, 0));
+    assert_eq!(word(&watch) & reset, reset, "the first after all were lost");
+    watch.handle_event(at(4), &Event::AllReached);
+    assert_eq!(word(&watch) & reset, 0);
+    watch.handle_event(at(5), &Event::ResetBegun);
+    assert_eq!(word(&watch) & (reset | NetworkState::LOCKED), reset, "a program asked for it");
+}
+
 // proves: DIA-09 partial: totals, HW-19 partial: totals
 #[test]
 fn counters_are_summed_up_through_clears_and_restarts() {

@@ -101,6 +101,18 @@ pub(super) fn of(
         | Event::CyclicFramesBack { .. }
         | Event::OutputsWithheld { .. }
         | Event::OutputsResumed { .. } => words.task(event),
+        Event::OutputsLocked => vec![words.line(
+            Severity::Error,
+            EntryKind::Host,
+            "the line has lost its link: outputs are locked until the network is reset. Do: look at \
+             the cable, then `linesman online SOCKET --reset`"
+                .into(),
+        )],
+        Event::ResetBegun => vec![words.line(
+            Severity::Info,
+            EntryKind::Host,
+            "the network is being reset: outputs are sent again".into(),
+        )],
         Event::Emergency { id, emergency } => {
             let text = format!(
                 ": emergency 0x{:04X} ({}), error register 0x{:02X}",

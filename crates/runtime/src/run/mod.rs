@@ -19,7 +19,7 @@ pub mod shared;
 pub mod tap;
 
 pub use group::NetworkPlace;
-pub use linesman_session::{Application, Idle, Io, MakePlan, Next, PlanSource};
+pub use linesman_session::{Application, Idle, Io, MakePlan, Next, PlanSource, StartTime};
 pub use note::{Note, RunError};
 pub use plan_choices::PlanChoices;
 pub use real_time::RealTime;

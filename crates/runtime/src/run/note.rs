@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use linesman_config::inventory::Inventory;
-use linesman_config::plan::Plan;
+use linesman_config::plan::{Plan, TimeSource};
 use linesman_diagnosis::HostObservation;
 use linesman_link::error::LinkError;
 use linesman_maindevice::Event;
@@ -29,6 +29,8 @@ pub enum Note {
     Missed(Instant, u64),
     /// A part of this program has failed.
     Failed(PartFailure),
+    /// The start waits for the time of this source, until the second time at most.
+    AwaitsTime(Instant, Instant, TimeSource),
     /// The line is being stopped.
     Leaving(Instant),
 }
@@ -41,6 +43,7 @@ impl From<RunEvent> for Note {
             RunEvent::MainDevice(at, event) => Self::Event(at, event),
             RunEvent::Host(observation) => Self::Host(observation),
             RunEvent::Finding(event) => Self::Finding(event),
+            RunEvent::AwaitsTime(at, until, source) => Self::AwaitsTime(at, until, source),
             RunEvent::Leaving(at) => Self::Leaving(at),
         }
     }

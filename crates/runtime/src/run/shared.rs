@@ -66,6 +66,11 @@ impl Application for Shared {
         }
         Next::Continue
     }
+
+    fn interface_gone(&mut self, io: &mut Io<'_>) {
+        // Published at the end of the run.
+        self.state.network = io.network_state().0;
+    }
 }
 
 impl Drop for Shared {

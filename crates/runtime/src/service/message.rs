@@ -41,6 +41,8 @@ pub enum Request {
         #[serde(default)]
         frames: bool,
     },
+    /// Reset the network: outputs that are locked after a link error are sent again.
+    Reset,
     /// A service for one SubDevice, beside the cycle.
     Serve {
         /// Its number in the plan, from 1.

@@ -171,6 +171,10 @@ impl PendingServices {
                 let frames = frames.then(|| main.statistics());
                 asked.give(ServiceReply::Clear { errors, frames });
             }
+            Request::Reset => asked.answer(match main.reset() {
+                true => Answer::done(),
+                false => Answer::refusal(NOT_UP.to_owned()),
+            }),
             Request::Serve { no, service } => match prepared(main, no, service) {
                 Ok((id, service)) => {
                     let ticket = main.serve(now, id, service);
@@ -245,6 +249,14 @@ pub fn online(path: &Path) -> io::Result<Answer> {
 /// As [`ask`].
 pub fn clear(path: &Path, errors: bool, frames: bool) -> io::Result<Answer> {
     request(path, &Request::Clear { errors, frames })
+}
+
+/// Resets the network: outputs that are locked after a link error are sent again.
+///
+/// # Errors
+/// As [`ask`].
+pub fn reset(path: &Path) -> io::Result<Answer> {
+    request(path, &Request::Reset)
 }
 
 fn request(path: &Path, request: &Request) -> io::Result<Answer> {

@@ -6,13 +6,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use linesman_config::inventory::Inventory;
-use linesman_config::plan::{IoAt, Plan};
+use linesman_config::plan::{IoAt, Plan, TimeSource};
 use linesman_diagnosis::{FrameSeen, HostObservation};
 use linesman_maindevice::{Event, MainDevice};
 use linesman_proto::time::{Instant, Span};
 
 use self::ending::Ending;
-use crate::application::{Application, Io, Next};
+use crate::application::{Application, Io, Next, StartTime};
 use crate::diagnosis::DiagnosisInput;
 use crate::frame::FrameSummary;
 use crate::probe;
@@ -22,7 +22,10 @@ use crate::session::SessionHooks;
 /// seconds.
 pub const SCAN_PATIENCE: Span = Span::s(60);
 
-/// Interval at which a network looks for those that lead it to have begun.
+/// Time for which a start waits for the time that its network is to begin in.
+pub const TIME_PATIENCE: Span = Span::s(60);
+
+/// Interval at which a network looks for those that lead it to have begun, and for a time to begin in.
 const GROUP_POLL: Span = Span::ms(1);
 
 /// Plan that is to be run.
@@ -49,6 +52,8 @@ pub enum RunEvent {
     Host(HostObservation),
     /// The diagnosis tells something.
     Finding(Box<linesman_diagnosis::Event>),
+    /// The start waits for the time of this source, until the second time at most.
+    AwaitsTime(Instant, Instant, TimeSource),
     /// The line is being stopped.
     Leaving(Instant),
 }
@@ -72,8 +77,12 @@ pub struct PlanRun<A, D> {
     io_at: IoAt,
     plan: Option<Arc<Plan>>,
     begun: bool,
-    /// It waits for networks that lead it; then it is looked again.
+    /// It waits for networks that lead it, or for their time; then it is looked again.
     waits_until: Option<Instant>,
+    /// A plan that waits for the time it is to begin in.
+    awaiting: Option<Box<Plan>>,
+    /// End of that wait.
+    awaited_until: Option<Instant>,
     scan_until: Instant,
     reached_at: Option<Instant>,
     failure: Option<RunFailure>,
@@ -103,6 +112,8 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
             plan: None,
             begun: false,
             waits_until: None,
+            awaiting: None,
+            awaited_until: None,
             scan_until: Instant::MAX,
             reached_at: None,
             failure: None,
@@ -139,6 +150,15 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
     pub fn io<'a>(&self, now: Instant, main: &'a mut MainDevice) -> Io<'a> {
         let missed = main.statistics().cycles_missed;
         Io { main, now, missed, withheld: self.withheld, old: false }
+    }
+
+    /// The interface of the line is gone: the application learns of it.
+    pub fn interface_gone(&mut self, now: Instant, main: &mut MainDevice) {
+        if self.plan.is_some() {
+            let missed = main.statistics().cycles_missed;
+            let mut io = Io { main, now, missed, withheld: self.withheld, old: false };
+            self.application.interface_gone(&mut io);
+        }
     }
 
     /// True while outputs are withheld because they were not given in time.
@@ -185,8 +205,77 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
         self.events.pop_front()
     }
 
-    /// Starts with a plan.
+    /// Starts with a plan, as soon as the time is known that it is to begin in.
     pub fn start(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
+        self.scan_until = Instant::MAX;
+        match self.start_time(now, &plan, main) {
+            Ok(true) => self.start_now(now, plan, main),
+            Ok(false) => self.await_time(now, plan, main),
+            Err(why) => self.failure = Some(RunFailure::Plan(why)),
+        }
+    }
+
+    /// True once the time is known that a plan is to begin in; the MainDevice has it then.
+    fn start_time(
+        &mut self,
+        now: Instant,
+        plan: &Plan,
+        main: &mut MainDevice,
+    ) -> Result<bool, String> {
+        match plan.time_source {
+            Some(TimeSource::UpperNetwork) if !main.is_in_group() => Err(
+                "time_source is `upper-network`, but this run has no other network. Do: run both networks by one \
+                 `linesman run` (--on of each), or write another time_source in [network]"
+                    .to_owned(),
+            ),
+            Some(TimeSource::UpperNetwork) => {
+                Ok(plan.reference_clock().is_none() || main.knows_group_time())
+            }
+            Some(TimeSource::Program) => match self.application.start_time(now) {
+                StartTime::OfHost => Ok(true),
+                StartTime::Awaited => Ok(false),
+                StartTime::Told(time) => {
+                    main.tell_outside_time(now, time);
+                    Ok(true)
+                }
+            },
+            None
+            | Some(TimeSource::ReferenceClock | TimeSource::Host | TimeSource::Device(_)) => {
+                Ok(true)
+            }
+        }
+    }
+
+    /// Keeps a plan until its time is known, for [`TIME_PATIENCE`] at most.
+    fn await_time(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
+        let until = self.awaited_until.unwrap_or(now + TIME_PATIENCE);
+        if self.awaited_until.replace(until).is_none() {
+            // The one whose time it waits for may come behind it.
+            main.give_up_turn();
+            if let Some(source) = plan.time_source {
+                self.events.push_back(RunEvent::AwaitsTime(now, until, source));
+            }
+        }
+        if now < until {
+            self.waits_until = Some(now + GROUP_POLL);
+            self.awaiting = Some(Box::new(plan));
+            return;
+        }
+        let (whose, look) = match plan.time_source {
+            Some(TimeSource::UpperNetwork) => (
+                "the upper network",
+                "look whether the network that leads is up and has clocks (`clock = { reference = true }`)",
+            ),
+            _ => ("the program", "look why it does not know the time"),
+        };
+        self.failure = Some(RunFailure::Plan(format!(
+            "{whose} has told no time for {} s, in which this network is to begin; it was not started. Do: {look}, or              write another time_source in [network]",
+            TIME_PATIENCE.as_nanos() / 1_000_000_000
+        )));
+    }
+
+    fn start_now(&mut self, now: Instant, plan: Plan, main: &mut MainDevice) {
+        (self.awaiting, self.waits_until) = (None, None);
         if let Err(why) = self.application.begin(&plan) {
             self.failure = Some(RunFailure::Plan(why));
             return;
@@ -330,6 +419,8 @@ impl<A: Application, D: DiagnosisInput> SessionHooks for PlanRun<A, D> {
                 self.begun = true;
                 self.begin(now, main);
             }
+        } else if let Some(plan) = self.awaiting.take() {
+            self.start(now, *plan, main);
         }
         if self.plan.is_none() && now > self.scan_until && self.failure.is_none() {
             let words =

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use linesman_config::plan::TimeSource;
 use linesman_diagnosis::report::{Diagnosis, PlaceReport, Severity, Verdict};
 use linesman_diagnosis::{Event as FindingEvent, EventKind};
 use linesman_link::unix_time::UnixTime;
@@ -132,6 +133,18 @@ impl RunReporter {
             Note::Finding(event) => self.finding(event, output),
             Note::Missed(at, left_out) => self.missed(*at, *left_out, output),
             Note::Failed(failure) => self.failed(failure, output),
+            Note::AwaitsTime(at, until, source) => {
+                let whose = match source {
+                    TimeSource::UpperNetwork => "the upper network",
+                    TimeSource::Program
+                    | TimeSource::ReferenceClock
+                    | TimeSource::Host
+                    | TimeSource::Device(_) => "the program",
+                };
+                let most = time(until.since(*at).as_nanos());
+                let text = format!("waits for the time of {whose} to begin in it, {most} at most");
+                self.said(*at, &text, output);
+            }
             Note::Leaving(at) => self.said(*at, "stopping: outputs to zero", output),
         }
     }

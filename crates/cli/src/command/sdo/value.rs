@@ -140,7 +140,11 @@ pub(crate) fn whole(text: &str) -> Option<i128> {
 pub(crate) fn bytes(text: &str) -> Option<Vec<u8>> {
     let digits: String =
         text.trim_start_matches("0x").chars().filter(|letter| !" :,-".contains(*letter)).collect();
-    if !digits.len().is_multiple_of(2) || !digits.bytes().all(|digit| digit.is_ascii_hexdigit()) {
+    // A prefix alone is a number that was left out.
+    if (digits.is_empty() && !text.is_empty())
+        || !digits.len().is_multiple_of(2)
+        || !digits.bytes().all(|digit| digit.is_ascii_hexdigit())
+    {
         return None;
     }
     (0..digits.len())

@@ -72,6 +72,8 @@ pub struct PlanOptions {
     pub base_tick: Span,
     /// Ports whose link was lost open by order only.
     pub ports_open_by_order: bool,
+    /// Outputs are withheld after a link error until the network is reset.
+    pub lock_after_link_error: bool,
     /// Groups that join and leave while the network runs.
     pub groups: Vec<HotConnectGroup>,
     /// What is said of the clocks of its ring.
@@ -95,6 +97,7 @@ impl Default for PlanOptions {
             time_source: None,
             base_tick: Span::ms(1),
             ports_open_by_order: false,
+            lock_after_link_error: false,
             groups: Vec::new(),
             ring_clocks: RingClocks::default(),
         }
@@ -207,6 +210,7 @@ impl Plan {
             sync_window: options.sync_window,
             base_tick: options.base_tick,
             ports_open_by_order: options.ports_open_by_order,
+            lock_after_link_error: options.lock_after_link_error,
             groups: options.groups.clone(),
             ring_clocks: options.ring_clocks,
             ..Self::empty(tree)

@@ -120,6 +120,12 @@ impl<L: Transport<Error = LinkError>, A: Application> StartedRun<'_, L, A> {
     /// Drives the line until its time is over, somebody wants it to stop, or the application has enough.
     pub fn drive(&mut self) {
         self.ran = self.driver.drive(self.until, self.stop);
+        if let Err(RunError::Link(LinkError::Vanished { .. })) = &self.ran {
+            let now = self.driver.now();
+            let (hooks, main) = self.driver.session_mut().parts_mut();
+            main.handle_interface_gone();
+            hooks.run.interface_gone(now, main);
+        }
     }
 
     /// Drives the line until the application has been called, and the turn is the caller's: [`StartedRun::io`].
