@@ -16,7 +16,8 @@ use linesman_proto::topology::{End, Hop, Route};
 
 use super::input::LocateInput;
 use super::intervals::Intervals;
-use crate::model::{CounterTrack, Counting, Rise, Tally};
+use crate::model::{CounterTrack, Counting, Rise};
+use lost_beside::LostAtCard;
 
 /// Damage on one hop: a link in one direction, with the sender and the receiver at its ends.
 #[derive(Clone, PartialEq, Debug)]
@@ -117,14 +118,6 @@ impl Located {
         located.last_hops.extend(ends.into_iter().flatten());
         located
     }
-}
-
-/// Frames that were lost, as far as the way into one card may have to do with them.
-enum LostAtCard {
-    /// In a ring, copies that did not come to it.
-    Copies(Tally),
-    /// Frames of which nothing came back.
-    Frames(Tally),
 }
 
 /// Links that come up together with the computer spoil the first frames; those are not missed.
@@ -425,19 +418,6 @@ impl ErrorWalk<'_, '_> {
             first,
             last,
         })
-    }
-
-    /// Losses that the way into a card may have to do with; none where copies were lost to the other card alone: what one
-    /// card sends for itself is lost as a whole where its copies are.
-    fn losses_at(&self, card: Path) -> Option<LostAtCard> {
-        let losses = &self.input.model().traffic.losses;
-        let (frames, copies) = (losses.frames(), losses.copies(card));
-        // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
-        if copies.of_spell() > frames.of_spell() {
-            return Some(LostAtCard::Copies(copies));
-        }
-        let elsewhere = losses.copies(card.other()).of_spell();
-        (elsewhere <= frames.of_spell()).then_some(LostAtCard::Frames(frames))
     }
 
     /// Frames that were lost while no counter moved and none of the card is known.

@@ -1,14 +1,15 @@
 //! Frames that were lost beside other damage, or beside links that changed: at moments at which no controller counted
 //! anything and no link changed.
 
+use linesman_proto::address::Path;
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::{Instant, Span};
 use linesman_proto::topology::Route;
 
-use super::{COMING_UP, ErrorWalk, IN_A_ROW, LastHop, LostAtCard};
+use super::{COMING_UP, ErrorWalk, IN_A_ROW, LastHop};
 use crate::locate::Intervals;
-use crate::model::CounterTrack;
 use crate::model::counters::RISES_KEPT;
+use crate::model::{CounterTrack, Tally};
 
 /// A frame that is lost was damaged so long after it was sent at most.
 const IN_FLIGHT: Span = Span::ms(10);
@@ -17,7 +18,28 @@ const IN_FLIGHT: Span = Span::ms(10);
 /// or two.
 const BESIDE_CHANGES: usize = 4;
 
+/// Frames that were lost, as far as the way into one card may have to do with them.
+pub(super) enum LostAtCard {
+    /// In a ring, copies that did not come to it.
+    Copies(Tally),
+    /// Frames of which nothing came back.
+    Frames(Tally),
+}
+
 impl ErrorWalk<'_, '_> {
+    /// Losses that the way into a card may have to do with; none where copies were lost to the other card alone: what one
+    /// card sends for itself is lost as a whole where its copies are.
+    pub(super) fn losses_at(&self, card: Path) -> Option<LostAtCard> {
+        let losses = &self.input.model().traffic.losses;
+        let (frames, copies) = (losses.frames(), losses.copies(card));
+        // In a ring one of the two copies is lost at a time; a few whole ones were lost while it came up.
+        if copies.of_spell() > frames.of_spell() {
+            return Some(LostAtCard::Copies(copies));
+        }
+        let elsewhere = losses.copies(card.other()).of_spell();
+        (elsewhere <= frames.of_spell()).then_some(LostAtCard::Frames(frames))
+    }
+
     /// Frames that were lost beside other damage or links that changed: at a time at which no controller counted anything, as
     /// readings before and after it show, and no link changed.
     pub(super) fn unknown_beside(&self, route: &Route) -> Option<LastHop> {
