@@ -269,7 +269,8 @@ impl<A: Application, D: DiagnosisInput> PlanRun<A, D> {
             _ => ("the program", "look why it does not know the time"),
         };
         self.failure = Some(RunFailure::Plan(format!(
-            "{whose} has told no time for {} s, in which this network is to begin; it was not started. Do: {look}, or              write another time_source in [network]",
+            "{whose} has told no time for {} s, in which this network is to begin; it was not started. Do: {look}, or \
+             write another time_source in [network]",
             TIME_PATIENCE.as_nanos() / 1_000_000_000
         )));
     }
