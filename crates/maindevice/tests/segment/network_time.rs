@@ -446,7 +446,8 @@ fn local_network_takes_the_speed_of_an_upper_one_that_a_program_tells() {
 #[test]
 fn local_network_takes_the_time_and_the_phase_of_an_upper_one_that_is_told_before_its_start() {
     let (least, most, mut local, _) = below_an_upper_network(true);
-    assert!(least > -500 && most < 500, "{least} to {most} ns ahead of the upper network");
+    // A cyclic frame that waits behind another one brings its time later: that leads the clock a little astray.
+    assert!(least > -1_000 && most < 1_000, "{least} to {most} ns ahead of the upper network");
     // Its frames are there at multiples of the cycle, by the time that is that of the upper one.
     for _ in 0..1_000 {
         let next = local.device.next_cycle(0).unwrap();
