@@ -213,5 +213,6 @@ fn local_network_that_does_not_wait_begins_in_a_time_of_its_own() {
     assert!(local.first().unwrap().0 < 5_000_000_000);
     let of_upper = upper.iter().find(|(at, _)| *at > SILENT_NS + 2_000_000_000).unwrap();
     let ahead = ahead_at(&upper, &local, of_upper.0);
-    assert!(ahead.abs() > 100_000, "{ahead} ns when the time of the upper network was known");
+    // One that waits is within 5 us then.
+    assert!(ahead.abs() > 10_000, "{ahead} ns when the time of the upper network was known");
 }
