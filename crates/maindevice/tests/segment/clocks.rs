@@ -199,7 +199,7 @@ fn behind_an_et1200() -> String {
     (0..104).map(device).collect()
 }
 
-// proves: DC-04 partial
+// proves: DC-01 partial: behind ports that take the next frame
 #[test]
 fn frames_ahead_of_the_one_that_latches_spoil_no_delay() {
     let mut bench = Bench::new(&behind_an_et1200());
