@@ -241,7 +241,7 @@ fn reset(path: &Path, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What only a MainDevice that drives the line can do.
+/// Refusal of a reset of a line that no MainDevice drives.
 fn refuse_reset(place: &str) -> Failure {
     let reason = format!("{place}: no MainDevice drives it, so there is nothing to reset");
     Failure::new(reason, "name the socket of `linesman run --on NIC --control SOCKET`")

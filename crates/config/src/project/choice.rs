@@ -61,7 +61,7 @@ pub struct Network {
     /// A port whose link was lost stays closed when the link is back, until the MainDevice has prepared the
     /// section behind it and orders it to open; else it opens by itself, at once.
     pub ports_open_by_order: bool,
-    /// When no card of the line has a link any more, outputs are withheld and SubDevices kept below OP until the network is
+    /// Outputs are withheld and SubDevices kept below OP, once no card of the line has a link any more, until the network is
     /// reset (`linesman online SOCKET --reset`); else they go on as soon as SubDevices answer again.
     pub lock_after_link_error: bool,
 }

@@ -249,8 +249,8 @@ impl FindingStore {
         if is_covered { all.max_by_key(share) } else { None }
     }
 
-    /// Where the amount of a sum alone names a place, and is over: a finding that took a part of that sum meanwhile.
-    /// What was missing then is known to have had another reason, be it seen late.
+    /// Finding that took a part of a sum while the amount of that sum alone named a place, and that is over. The missing
+    /// part is known to have had another reason then, be it seen late.
     fn known_beside(&self, index: usize) -> Option<usize> {
         let effect = &self.findings[index];
         let closed = effect.closed.filter(|_| effect.condition.is_by_sum_alone)?;
@@ -345,7 +345,7 @@ mod tests {
     use super::*;
     use crate::rule::working_counter::PAGE;
 
-    /// What takes the share of a SubDevice from a working counter, from `since` to `ended`, in ms.
+    /// Outage that takes the share of a SubDevice from a working counter, from `since` to `ended`, in ms.
     fn condition(device: u32, since: u64, ended: u64) -> Condition {
         let at = |ms| Instant::ZERO + Span::ms(ms);
         let place = Place::device(Network(0), DeviceId(device));

@@ -83,7 +83,7 @@ pub(crate) struct Exchange {
     earliest: Instant,
     outgoing: Outgoing,
     queue: VecDeque<Queued>,
-    /// When the first of the queue was first held back because other frames are out.
+    /// Time at which the first of the queue was first held back because other frames are out.
     held_back: Option<Instant>,
     acyclic_out: usize,
     number: u32,

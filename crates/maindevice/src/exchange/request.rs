@@ -104,7 +104,7 @@ pub struct Request {
     pub card: Option<Path>,
     /// How often it is sent again when its frame does not come back.
     pub repeats: u8,
-    /// What may be on its way beside it.
+    /// Frames that may be on their way beside it.
     pub departure: Departure,
 }
 

@@ -143,7 +143,7 @@ impl MainDevice {
         asked
     }
 
-    /// Whether all SubDevices of the running plan are where they shall be.
+    /// True if all SubDevices of the running plan are where they shall be.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.running.as_ref().is_some_and(|running| {

@@ -16,7 +16,7 @@ const FORGIVEN_AFTER: Span = Span::s(1);
 pub(super) struct CardStates {
     /// Which of them have a link.
     links: [bool; 2],
-    /// When a card that took no frame counts as taking them again; [`Instant::MAX`]: all take them.
+    /// Time at which a card that took no frame counts as taking them again; [`Instant::MAX`]: all take them.
     forgiven_at: Instant,
     /// Outputs are locked.
     pub(super) locked: bool,

@@ -21,7 +21,7 @@ impl MainDevice {
         known.unwrap_or_else(by_host)
     }
 
-    /// What bringing up the running plan took so far; `None` unless one is running.
+    /// Times that bringing up the running plan took so far; `None` unless one is running.
     #[must_use]
     pub fn bring_up_times(&self) -> Option<BringUpTimes> {
         self.running.as_ref().and_then(|running| lock(&running.device_table).times().cloned())
