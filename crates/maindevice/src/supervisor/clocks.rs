@@ -111,21 +111,50 @@ pub(super) async fn latch_alone(context: &Context) -> LatchRight {
     LatchRight(Arc::clone(&context.device_table))
 }
 
-/// Sets the clocks of all, or of one that came back later.
-async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress, ClockError> {
+/// Latches receive times `times` times, while nobody else does. A whole ring whose ports do not keep the times of both copies of a
+/// frame is open for as long as that takes.
+///
+/// # Errors
+/// [`ClockError`] of the first that failed; the ring is closed again then, too.
+pub(super) async fn latch(context: &Context, times: u32) -> Result<Vec<Latch>, ClockError> {
     let wire = &context.wire;
-    let alone = latch_alone(context).await;
-    let mut latched = clock::latch(wire, context.network).await;
-    if let Err(ClockError::OneWay { .. } | ClockError::Delay(_)) = latched
-        && let Some((station, control)) = open_ring(context).await?
-    {
-        latched = clock::latch(wire, context.network).await;
+    let _alone = latch_alone(context).await;
+    let first = clock::latch(wire, context.network).await;
+    let needs_open = matches!(first, Err(ClockError::OneWay { .. } | ClockError::Delay(_)));
+    let opened = if needs_open { open_ring(context).await? } else { None };
+    let mut latches = Vec::new();
+    let outcome = match (first, opened) {
+        (Err(error), None) => Err(error),
+        (first, _) => {
+            latches.extend(first);
+            latch_until(context, &mut latches, times).await
+        }
+    };
+    if let Some((station, control)) = opened {
         let bytes = control.to_bytes();
         let _ = wire.write_one(station, register::DL_CONTROL.address, &bytes).await;
         lock(&context.device_table).opened_until = wire.now() + SEEN;
     }
-    drop(alone);
-    let Latch { at, clocks } = latched?;
+    outcome.map(|()| latches)
+}
+
+/// Latches until there are so many.
+async fn latch_until(
+    context: &Context,
+    latches: &mut Vec<Latch>,
+    times: u32,
+) -> Result<(), ClockError> {
+    while latches.len() < times as usize {
+        latches.push(clock::latch(&context.wire, context.network).await?);
+    }
+    Ok(())
+}
+
+/// Sets the clocks of all, or of one that came back later.
+async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress, ClockError> {
+    let wire = &context.wire;
+    let latched = latch(context, 1).await?.pop();
+    let Some(Latch { at, clocks }) = latched else { return Err(ClockError::LineChanged) };
     for clock in clocks.iter().filter(|clock| !clock.has_clock) {
         let planned = context.plan.devices.iter().find(|device| device.station == clock.station);
         if let Some(device) = planned {

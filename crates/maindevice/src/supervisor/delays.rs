@@ -17,7 +17,7 @@ use linesman_proto::time::Span;
 use super::{Context, clocks};
 use crate::exchange::{ExchangeError, Target};
 use crate::executor::lock;
-use crate::procedure::clock::{self, ClockError};
+use crate::procedure::clock::ClockError;
 
 /// Time from one look to the next whether the line still changes.
 const LOOK: Span = Span::ms(2);
@@ -87,12 +87,10 @@ async fn settled(context: &Context) -> Answering {
 /// Measures the delays of all clocks that show the time, and tells them to those that have another one, if the line is still the one
 /// that was `settled`.
 async fn measure(context: &Context, settled: Answering) -> Result<(), ClockError> {
-    let wire = &context.wire;
-    let alone = clocks::latch_alone(context).await;
     // By place: who comes first in processing order comes first.
     let mut sums: Vec<Sum> = Vec::new();
-    for _ in 0..MEASUREMENTS {
-        for clock in clock::latch(wire, context.network).await?.clocks {
+    for latch in clocks::latch(context, MEASUREMENTS).await? {
+        for clock in latch.clocks {
             let Some(delay) = clock.delay else { continue };
             let known = sums.iter().position(|sum| sum.station == clock.station);
             let at = known.unwrap_or_else(|| {
@@ -102,7 +100,6 @@ async fn measure(context: &Context, settled: Answering) -> Result<(), ClockError
             sums[at].add(delay.as_nanos() as i64);
         }
     }
-    drop(alone);
     if answering(context) != settled || sums.iter().any(Sum::is_mixed) {
         return Err(ClockError::LineChanged);
     }

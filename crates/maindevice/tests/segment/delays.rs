@@ -117,6 +117,11 @@ fn told(bench: &Bench) -> Vec<u32> {
     (0..6).map(delay).collect()
 }
 
+/// True if delays are the right ones, but for the steps of 10 ns in which clocks are read: each hop is off by a few of them.
+fn is_near(told: &[u32], right: &[u32]) -> bool {
+    told.iter().zip(right).all(|(told, right)| told.abs_diff(*right) <= 60)
+}
+
 /// A bench of the ring in OP, with clocks in step; the tool is plugged in or not.
 fn ring_in_step(text: &str, plan: &Plan, is_in: bool) -> Bench {
     let mut bench = Bench::with_options(text, options(text));
@@ -139,19 +144,14 @@ fn delays_of_a_whole_ring_are_those_of_the_line_and_it_is_not_opened_for_them() 
     let mut bench = Bench::with_options(&ring, options(&ring));
     start(&mut bench, plan(&ring));
     let of_ring = told(&bench);
-    // Clocks are read in steps of 10 ns, and each hop is off by a few of them.
-    let is_near = |(a, b): (&u32, &u32)| a.abs_diff(*b) <= 60;
-    assert!(of_line.iter().zip(&of_ring).all(is_near), "{of_line:?} {of_ring:?}");
+    assert!(is_near(&of_line, &of_ring), "{of_line:?} {of_ring:?}");
     let is_open = |event: &Event| matches!(event, Event::Ring { intact: false });
     assert!(!bench.events.iter().any(|(_, event)| is_open(event)), "{}", story(&bench));
 }
 
-#[test]
-fn a_ring_is_opened_to_measure_delays_when_frames_of_the_second_card_leave_no_times() {
-    let ring = with_tool_in_a_ring();
-    let plan = plan(&ring);
-    let mut bench = Bench::with_options(&ring, options(&ring));
-    // What card B sends of broadcast writes to 0x0900 never leaves it in time.
+/// A bench on which what card B sends of broadcast writes to 0x0900 never leaves it in time.
+fn without_times_of_card_b(text: &str) -> Bench {
+    let mut bench = Bench::with_options(text, options(text));
     bench.leaves_after = Some(Box::new(|frame| {
         let is_latch = FrameView::parse(frame).is_ok_and(|view| {
             let mut datagrams = view.datagrams().map_while(Result::ok);
@@ -160,6 +160,14 @@ fn a_ring_is_opened_to_measure_delays_when_frames_of_the_second_card_leave_no_ti
         });
         if is_latch { Span::s(3600) } else { Span::ZERO }
     }));
+    bench
+}
+
+#[test]
+fn a_ring_is_opened_to_measure_delays_when_frames_of_the_second_card_leave_no_times() {
+    let ring = with_tool_in_a_ring();
+    let plan = plan(&ring);
+    let mut bench = without_times_of_card_b(&ring);
     start(&mut bench, plan.clone());
     let is_open = |event: &Event| matches!(event, Event::Ring { intact: false });
     assert!(bench.events.iter().any(|(_, event)| is_open(event)), "{}", story(&bench));
@@ -176,9 +184,6 @@ fn clocks_behind_a_group_in_a_ring_are_told_their_delays_after_joins_breaks_and_
     let with = told(&ring_in_step(&ring, &plan, true));
     // Behind the tool the frame comes later by all of its way.
     assert!((1..6).all(|at| with[at] > without[at] + 300), "{with:?} {without:?}");
-    let is_near = |told: &[u32], right: &[u32]| {
-        told.iter().zip(right).all(|(told, right)| told.abs_diff(*right) <= 60)
-    };
     // It joins and leaves while the ring is whole, while it is open behind the tool, and while it is open in front of it.
     for cable in [None, Some("K2.C-K3.A"), Some("maindevice-K0.A")] {
         let mut bench = ring_in_step(&ring, &plan, false);
@@ -205,4 +210,34 @@ fn clocks_behind_a_group_in_a_ring_are_told_their_delays_after_joins_breaks_and_
         assert!(is_near(&told(&bench), &without), "{cable:?}: {:?} {without:?}", told(&bench));
         assert!(settled <= 100 && at_once <= 300, "{cable:?}: {at_once}, {settled} ns");
     }
+}
+
+#[test]
+fn a_ring_is_opened_again_to_measure_delays_after_a_group_has_joined_and_a_cable_was_mended() {
+    let ring = with_tool_in_a_ring();
+    let plan = plan(&ring);
+    let without = told(&ring_in_step(&ring, &plan, false));
+    let with = told(&ring_in_step(&ring, &plan, true));
+    let mut bench = without_times_of_card_b(&ring);
+    bench.segment.unplug(bench.now, "X").unwrap();
+    bench.run_for(Span::ms(10));
+    start(&mut bench, plan.clone());
+    bench.run_for(Span::s(20));
+    assert!(is_near(&told(&bench), &without), "{:?} {without:?}", told(&bench));
+    bench.segment.plug(bench.now, "X", None).unwrap();
+    let joined = |event: &Event| matches!(event, Event::GroupJoined { .. });
+    assert!(bench.run_until(Span::s(10), joined), "{}", story(&bench));
+    bench.run_for(Span::s(2));
+    assert!(is_near(&told(&bench), &with), "{:?} {with:?}", told(&bench));
+    let fault = cut(&mut bench, "K2.C-K3.A");
+    bench.run_for(Span::s(1));
+    bench.segment.unplug(bench.now, "X").unwrap();
+    bench.run_for(Span::s(1));
+    bench.segment.heal(bench.now, fault);
+    let whole = |event: &Event| matches!(event, Event::Ring { intact: true });
+    assert!(bench.run_until(Span::s(10), whole), "{}", story(&bench));
+    bench.run_for(Span::s(2));
+    assert!(is_near(&told(&bench), &without), "{:?} {without:?}", told(&bench));
+    assert_eq!(bench.device.ring_intact(), Some(true));
+    assert!(worst(&mut bench, &plan, Span::ms(100)) <= 100);
 }
