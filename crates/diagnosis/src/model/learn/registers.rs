@@ -328,8 +328,9 @@ fn dl_status(device: &Device, data: &[u8], start: RegisterAddress) -> Option<DlS
 /// Takes the receive times of a controller. Says whether they tell anything.
 ///
 /// In a closed ring the frame does not come back to the ports that lead on: what they show is of the copy that went the other
-/// way, or of an earlier frame. In an open one those of the far half met it the other way round. A port that is closed by order, as the end of a ring is while delays are measured, keeps the
-/// time that it had.
+/// way, or of an earlier frame. In an open one those of the far half met it the other way round. A port that is closed, by order as
+/// the end of a ring is while delays are measured, or since nobody is there any more, keeps the time that it had: those of a
+/// controller whose ports were all open are more than a later set without one of them.
 fn learn_receive_times(
     model: &mut NetworkModel,
     id: DeviceId,
@@ -341,11 +342,17 @@ fn learn_receive_times(
     }
     let closed = model.closed_by_order(id, read_at);
     let Some(device) = model.devices.get_mut(id.index()) else { return false };
+    let dl = &device.dl;
+    let has_shut = |port| dl.was_active(port) == Some(true) && dl.is_active(port) == Some(false);
+    let is_shut = |port| closed == Some(port) || has_shut(port);
+    if device.received.is_some() && Port::ALL.into_iter().any(is_shut) {
+        return false;
+    }
     device.received = Some(PortMap::from_fn(|port| {
         let at = 4 * port.index();
         let bytes = bytes.get(at..at + 4).and_then(|bytes| bytes.first_chunk());
         let time = DcTime32(bytes.map_or(0, |bytes| u32::from_le_bytes(*bytes)));
-        (closed != Some(port)).then_some(time)
+        (!is_shut(port)).then_some(time)
     }));
     true
 }
@@ -389,6 +396,32 @@ mod tests {
         assert!(learn_receive_times(&mut model, id, &times(9_000, 9_700), at + Span::s(2)));
         let received = model.devices[0].received.expect("it was read");
         assert_eq!(received[Port::C], Some(DcTime32(9_700)));
+    }
+
+    #[test]
+    fn receive_times_of_when_all_ports_were_open_stay_when_one_has_lost_its_link() {
+        let (id, at) = (DeviceId(0), Instant::ZERO + Span::ms(300));
+        let mut device = Device::new(id);
+        let open = |ports: &[Port]| {
+            let state = PortState { link: true, communication: true, ..PortState::default() };
+            ports.iter().fold(DlStatus::default(), |status, port| status.with_port(*port, state))
+        };
+        device.dl.record(open(&[Port::A, Port::C]), at, None);
+        let mut model = NetworkModel { devices: vec![device], ..NetworkModel::default() };
+        assert!(learn_receive_times(&mut model, id, &times(5_000, 5_700), at));
+        // Nobody is behind C any more, and the frame is latched anew: C keeps the time of the one before.
+        model.devices[0].dl.record(open(&[Port::A]), at + Span::s(1), None);
+        assert!(!learn_receive_times(&mut model, id, &times(9_000_000, 5_700), at + Span::s(1)));
+        let received = model.devices[0].received.expect("it was read");
+        assert_eq!(
+            (received[Port::A], received[Port::C]),
+            (Some(DcTime32(5_000)), Some(DcTime32(5_700)))
+        );
+        // So it is when they are the first that are read.
+        model.devices[0].received = None;
+        assert!(learn_receive_times(&mut model, id, &times(9_000_000, 5_700), at + Span::s(1)));
+        let received = model.devices[0].received.expect("it was read");
+        assert_eq!((received[Port::A], received[Port::C]), (Some(DcTime32(9_000_000)), None));
     }
 
     #[test]
