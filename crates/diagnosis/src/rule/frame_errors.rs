@@ -234,6 +234,14 @@ fn symptoms(input: &LocateInput<'_>, suspicion: &Suspicion) -> Vec<Symptom> {
             None
         }
         LastHop::Damaged { .. } => Some(Symptom::CardErrors),
+        // Nor does a link that opens or closes take so many, at moments at which none did.
+        LastHop::Unknown { lost, first, last, .. }
+            if *lost > CUT_OFF
+                && input.any_link_changed(Instant::ZERO, *last)
+                && !input.any_link_changed(*first, *last) =>
+        {
+            None
+        }
         LastHop::Unknown { is_beside: false, .. } => Some(Symptom::FramesLost),
         // The other damage, which explains lost frames, does not explain these.
         LastHop::Unknown { is_beside: true, .. } => None,
