@@ -5,10 +5,10 @@
 //! delay that is no longer theirs. So nobody is given the time until they are measured.
 //!
 //! In an open ring each half is measured for itself. What has changed in the half of the reference is not known to the other one:
-//! there the first clock keeps its delay, and what is wrong with that is in the number that frames of the second card add
+//! there the clock that was set first keeps its delay, and what is wrong with that is in the number that frames of the second card add
 //! ([`super::open_ring`]). When the ring is whole again all are measured from the reference.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use linesman_proto::address::{Path, StationAddress, WorkingCounter};
 use linesman_proto::register;
@@ -105,14 +105,18 @@ async fn measure(context: &Context, settled: Answering) -> Result<(), ClockError
     }
     let (reference, with_time) = {
         let device_table = lock(&context.device_table);
-        (device_table.reference_clock(), device_table.with_time().collect::<BTreeSet<_>>())
+        (device_table.reference_clock(), device_table.with_time_by_age())
     };
-    let is_of_use = |sum: &&Sum| sum.times == MEASUREMENTS && with_time.contains(&sum.station);
+    let by_age: BTreeMap<StationAddress, usize> =
+        with_time.into_iter().enumerate().map(|(age, station)| (station, age)).collect();
+    let is_of_use = |sum: &&Sum| sum.times == MEASUREMENTS && by_age.contains_key(&sum.station);
     let Some(reference) = reference else { return Ok(()) };
     for card in Path::ALL {
         let half: Vec<&Sum> =
             sums.iter().filter(is_of_use).filter(|sum| sum.card == card).collect();
-        let base = half.iter().find(|sum| sum.station == reference).or(half.first());
+        let base = half.iter().find(|sum| sum.station == reference);
+        let oldest = || half.iter().min_by_key(|sum| by_age.get(&sum.station));
+        let base = base.or_else(oldest);
         if let Some(base) = base {
             tell(context, reference, base, &half).await?;
         }

@@ -48,8 +48,8 @@ struct DeviceEntry {
     /// How often its mailbox was opened: each time both ends begin to count anew.
     openings: u32,
     mailbox: bool,
-    /// Its clock was set since it was last without power.
-    clock_set: bool,
+    /// Its clock was set since it was last without power: after so many others.
+    clock_set: Option<u64>,
     /// That clock has 64 bits.
     clock_wide: bool,
     /// It was seen to have no clock.
@@ -69,7 +69,7 @@ struct DeviceEntry {
 impl DeviceEntry {
     /// True if it can be reached, and its clock shows the time of all others.
     const fn shows_time(&self) -> bool {
-        self.clock_set && matches!(self.found, Reachability::There { .. })
+        self.clock_set.is_some() && matches!(self.found, Reachability::There { .. })
     }
 }
 
@@ -102,6 +102,8 @@ pub(crate) struct DeviceTable {
     /// How often clocks were set, and the system time at the start of the run.
     clock_base: Option<(u32, DcTime)>,
     clocks_ready: bool,
+    /// Count of the clocks that were set, one after the other.
+    clocks_set: u64,
     /// Whom all other clocks follow: its address, and who it is if the plan has it.
     reference: Option<(StationAddress, Option<DeviceId>)>,
     /// The planned station addresses, by [`DeviceId`].
@@ -199,7 +201,8 @@ impl DeviceTable {
             live.losses + u32::from(found == Reachability::Lost && before != Reachability::Lost);
         // What was seen and asked for outlives a loss; what it serves does not.
         let DeviceEntry { openings, reached, target, requests, clock_set, clock_wide, .. } = *live;
-        let clock_set = clock_set && found != Reachability::There { restarted: true };
+        let clock_set =
+            clock_set.filter(|_| found != Reachability::There { restarted: true });
         let new = DeviceEntry {
             found,
             settled,

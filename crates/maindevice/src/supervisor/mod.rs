@@ -184,10 +184,14 @@ pub(crate) async fn supervise(context: Context, scan_cache: Option<ScanCache>) {
         let has_changed = responding != located_at || lost_groups != losses;
         if has_changed || now >= thorough_at {
             thorough_at = now + THOROUGH_INTERVAL;
+            let ring_intact = context.wire.ring_intact();
             // A silent line is found out by the supervisors; the next round tries again.
             if locate::again(&context).await.is_ok() {
-                (located_at, losses) = (responding, lost_groups);
-                are_newcomers = false;
+                // Of a ring that opened or closed meanwhile a half may not have been looked through.
+                let is_whole = context.wire.ring_intact() == ring_intact;
+                located_at = responding.filter(|_| is_whole);
+                losses = lost_groups;
+                are_newcomers &= !is_whole;
             }
         }
     }

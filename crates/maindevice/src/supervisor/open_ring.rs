@@ -85,7 +85,7 @@ async fn measure(context: &Context) -> Result<Option<i64>, ExchangeError> {
     let (reference, others) = {
         let device_table = lock(&context.device_table);
         let Some(reference) = device_table.reference_clock() else { return Ok(None) };
-        let mut others: Vec<_> = device_table.with_time().collect();
+        let mut others = device_table.with_time_by_age();
         // Those of the others may have been told anew, and are on their way to it.
         others.sort_by_key(|station| Some(*station) != device_table.far_base);
         (reference, others)

@@ -34,14 +34,16 @@ impl Default for ReferenceClock {
 impl DeviceTable {
     /// The clock of a SubDevice was set: one of 64 bits if it is `wide`, else of 32.
     pub(crate) fn set_clock(&mut self, id: DeviceId, wide: bool) {
+        let after = self.clocks_set;
+        self.clocks_set += 1;
         if let Some(live) = self.live(id) {
-            (live.clock_set, live.clock_wide) = (true, wide);
+            (live.clock_set, live.clock_wide) = (Some(after), wide);
         }
     }
 
     /// Whether the clock of a SubDevice was set, and has had power since.
     pub(crate) fn has_clock_set(&self, id: DeviceId) -> bool {
-        self.devices.get(id.index()).is_some_and(|live| live.clock_set)
+        self.devices.get(id.index()).is_some_and(|live| live.clock_set.is_some())
     }
 
     /// A SubDevice was seen to have no clock.
@@ -87,6 +89,15 @@ impl DeviceTable {
     pub(crate) fn with_time(&self) -> impl Iterator<Item = StationAddress> {
         let all = self.devices.iter().zip(&self.stations);
         all.filter(|(live, _)| live.shows_time()).map(|(_, station)| *station)
+    }
+
+    /// Those that have the time of all, whose clock was set first before the others: it has had the longest time to learn its speed,
+    /// and one that has just joined may be microseconds off.
+    pub(crate) fn with_time_by_age(&self) -> Vec<StationAddress> {
+        let all = self.devices.iter().zip(&self.stations);
+        let mut with_time: Vec<_> = all.filter(|(live, _)| live.shows_time()).collect();
+        with_time.sort_by_key(|(live, _)| live.clock_set);
+        with_time.into_iter().map(|(_, station)| *station).collect()
     }
 
     /// Notes whether the delays that clocks were told are those of the line as it is.
