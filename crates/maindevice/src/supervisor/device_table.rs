@@ -201,8 +201,7 @@ impl DeviceTable {
             live.losses + u32::from(found == Reachability::Lost && before != Reachability::Lost);
         // What was seen and asked for outlives a loss; what it serves does not.
         let DeviceEntry { openings, reached, target, requests, clock_set, clock_wide, .. } = *live;
-        let clock_set =
-            clock_set.filter(|_| found != Reachability::There { restarted: true });
+        let clock_set = clock_set.filter(|_| found != Reachability::There { restarted: true });
         let new = DeviceEntry {
             found,
             settled,

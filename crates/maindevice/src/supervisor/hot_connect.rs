@@ -13,17 +13,18 @@ use linesman_config::identity::mismatch;
 use linesman_config::plan::{
     DevicePlan, HotConnectGroup, IdentificationCheck, IdentificationSource,
 };
-use linesman_proto::address::{DeviceId, Path, StationAddress};
-use linesman_proto::port::{Port, PortMap};
-use linesman_proto::register::{DL_STATUS, DlStatus, STATION_ADDRESS};
+use linesman_proto::address::{DeviceId, StationAddress};
+use linesman_proto::port::Port;
+use linesman_proto::register::STATION_ADDRESS;
 use linesman_proto::sii::Identity;
-use linesman_proto::topology::{End, Reconstruction, SeenController, Tree};
+use linesman_proto::topology::{End, Tree};
 
+use super::by_wiring::trees;
 use super::group_table::{GroupPlace, NotTaken};
-use super::locate::{FoundController, identify, stretch};
+use super::locate::{Equals, FoundController, identify, stretch};
 use super::{Context, Reachability};
 use crate::event::Event;
-use crate::exchange::{Reply, Target};
+use crate::exchange::Target;
 use crate::executor::lock;
 use crate::procedure::identification;
 
@@ -111,7 +112,7 @@ pub(super) async fn settle(context: &Context, found: Vec<FoundGroup>) {
             }
             lock(&context.device_table).groups.found(group, place);
         }
-        stretch(context, &seen, planned.members.clone()).await;
+        stretch(context, &seen, planned.members.clone(), Equals::First).await;
     }
 }
 
@@ -302,28 +303,4 @@ pub(super) async fn leave_alone(context: &Context, seen: &[FoundController]) {
     for one in seen {
         identification::calm_down(&context.wire, one.place).await;
     }
-}
-
-/// The wiring of what was seen, as the ports tell: one tree for each card.
-async fn trees(context: &Context, seen: &[FoundController]) -> Vec<(Range<usize>, Tree)> {
-    let wire = &context.wire;
-    let reads: Vec<_> =
-        seen.iter().map(|one| wire.read(one.place, DL_STATUS.address, DL_STATUS.len)).collect();
-    let mut ports = Vec::with_capacity(reads.len());
-    for read in reads {
-        let reply = read.await.ok().filter(Reply::answered);
-        let status = reply.map(|reply| DlStatus(reply.word(0)));
-        let open = PortMap::from_fn(|port| {
-            status.is_some_and(|status| status.port_state(port).is_active())
-        });
-        ports.push(SeenController { open, ..SeenController::default() });
-    }
-    let is_on_b = |one: &FoundController| matches!(one.place, Target::PositionOnB(_));
-    let on_a = seen.iter().take_while(|one| !is_on_b(one)).count();
-    let card = |range: Range<usize>, path| {
-        let tree = Reconstruction::of(path, &ports[range.clone()]).tree;
-        (range, tree)
-    };
-    let both = [card(0..on_a, Path::A), card(on_a..seen.len(), Path::B)];
-    both.into_iter().filter(|(range, _)| !range.is_empty()).collect()
 }

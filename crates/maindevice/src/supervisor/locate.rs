@@ -15,6 +15,7 @@ use linesman_proto::state::AlState;
 
 use super::align::align;
 use super::by_alias;
+use super::by_wiring;
 use super::hot_connect;
 use super::numbers::Numbers;
 use super::times::Phase;
@@ -40,6 +41,17 @@ pub(super) struct FoundController {
     pub(super) identity: Option<Identity>,
     /// It was found by its alias: it is no landmark, since it may be anywhere.
     pub(super) by_alias: bool,
+    /// Which of the plan hangs there, if the ports tell.
+    pub(super) wired: Option<DeviceId>,
+}
+
+/// Which of several equal ones a found one is taken for, where fewer are found than are planned.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Equals {
+    /// The first of them.
+    First,
+    /// None, unless one beside it is there: the others may come back yet.
+    Beside,
 }
 
 /// Looks for all, whatever addresses they have. Who a scan has identified a moment ago is known by the
@@ -111,7 +123,7 @@ async fn locate(
         let planned = planned.get(&station).copied();
         planned.filter(|_| unique && station.0 != 0 && !from_scratch)
     };
-    let seen: Vec<FoundController> = (stations.iter().zip(places).zip(who).zip(0..))
+    let mut seen: Vec<FoundController> = (stations.iter().zip(places).zip(who).zip(0..))
         .map(|(((station, place), identity), at)| FoundController {
             position: Position(at),
             place,
@@ -119,11 +131,17 @@ async fn locate(
             known: known(*station),
             identity,
             by_alias: anywhere.contains(station),
+            wired: None,
         })
         .collect();
+    if !from_scratch {
+        by_wiring::note(context, &mut seen).await;
+    }
     let (groups, mut seen) = hot_connect::claim(context, seen).await;
     seen.retain(|one| !one.by_alias);
-    match_stretches(context, &seen).await;
+    let equals = if from_scratch { Equals::First } else { Equals::Beside };
+    by_place(context, &mut seen).await;
+    match_stretches(context, &seen, equals).await;
     hot_connect::settle(context, groups).await;
     for device in &context.plan.devices {
         if lock(&context.device_table).found(device.id) == Reachability::Unknown {
@@ -134,8 +152,31 @@ async fn locate(
     Ok(())
 }
 
+/// Gives those their addresses that hang where one like them is planned: they are landmarks from then on. Those that are refused there,
+/// by their number, are no other one either.
+async fn by_place(context: &Context, seen: &mut Vec<FoundController>) {
+    identify(context, seen).await;
+    let fits = |one: &FoundController| {
+        let device = context.plan.device(one.wired?)?;
+        let found = one.identity?;
+        let is_it = mismatch(&device.identity, &found, device.revision_rule).is_none()
+            && by_alias::alias_of(device).is_none();
+        is_it.then_some(device.id)
+    };
+    let (placed, ids): (Vec<FoundController>, Vec<DeviceId>) =
+        seen.iter().filter_map(|one| Some((*one, fits(one)?))).unzip();
+    stretch(context, &placed, ids, Equals::Beside).await;
+    let is_there = |id: &DeviceId| {
+        matches!(lock(&context.device_table).found(*id), Reachability::There { .. })
+    };
+    seen.retain(|one| fits(one).is_none_or(|id| is_there(&id)));
+    for one in seen {
+        one.known = one.known.or(fits(one));
+    }
+}
+
 /// Matches controllers and planned SubDevices in each stretch between landmarks: those whose address is known.
-async fn match_stretches(context: &Context, seen: &[FoundController]) {
+async fn match_stretches(context: &Context, seen: &[FoundController], equals: Equals) {
     let (mut first_seen, mut first_planned) = (0, 0);
     for end in 0..=seen.len() {
         let landmark = seen.get(end).map(|seen| seen.known);
@@ -147,7 +188,7 @@ async fn match_stretches(context: &Context, seen: &[FoundController]) {
             let planned = &context.plan.devices[first_planned..end_planned];
             let fixed = planned.iter().filter(|one| context.plan.group_of(one.id).is_none());
             let fixed = fixed.map(|device| device.id).collect();
-            stretch(context, &seen[first_seen..end], fixed).await;
+            stretch(context, &seen[first_seen..end], fixed, equals).await;
             first_planned = end_planned + 1;
         }
         first_seen = end + 1;
@@ -194,7 +235,12 @@ pub(super) async fn identify(context: &Context, seen: &mut [FoundController]) {
 }
 
 /// Identifies unknown controllers, of which the plan has these.
-pub(super) async fn stretch(context: &Context, seen: &[FoundController], planned: Vec<DeviceId>) {
+pub(super) async fn stretch(
+    context: &Context,
+    seen: &[FoundController],
+    planned: Vec<DeviceId>,
+    equals: Equals,
+) {
     let planned: Vec<DeviceId> = (planned.into_iter())
         .filter(|id| by_alias::alias_of(&context.plan.devices[id.index()]).is_none())
         .filter(|id| !matches!(lock(&context.device_table).found(*id), Reachability::There { .. }))
@@ -224,6 +270,12 @@ pub(super) async fn stretch(context: &Context, seen: &[FoundController], planned
             true => align(seen.len(), planned.len(), fits),
         }
     };
+    let mut pairs: Vec<(usize, DeviceId)> =
+        pairs.into_iter().map(|(at, of)| (at, planned[of])).collect();
+    if equals == Equals::Beside && seen.len() != planned.len() {
+        let fits = |at: usize, id: DeviceId| differs(id, &identities[at]).is_none();
+        pairs = by_wiring::without_doubtful(context, pairs, &planned, fits);
+    }
     let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     for (at, found) in identities.iter().enumerate() {
         let is_known =
@@ -234,8 +286,8 @@ pub(super) async fn stretch(context: &Context, seen: &[FoundController], planned
         }
     }
     let mut giving = Vec::with_capacity(pairs.len());
-    for (at, of) in pairs {
-        let (id, found) = (planned[of], identities[at]);
+    for (at, id) in pairs {
+        let found = identities[at];
         match differs(id, &found) {
             None if numbers.refuses(context, &seen[at], at, id).await => {}
             None => {

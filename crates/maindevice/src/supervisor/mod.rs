@@ -8,6 +8,7 @@
 mod alert_sleep;
 mod align;
 mod by_alias;
+mod by_wiring;
 mod clocks;
 pub(crate) mod counters;
 mod delays;

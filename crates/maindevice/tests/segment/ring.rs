@@ -3,9 +3,10 @@
 use crate::bench::Bench;
 use linesman_config::plan::{Plan, PlanOptions};
 use linesman_maindevice::{Event, Options};
-use linesman_proto::address::Path;
+use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::frame::FrameView;
 use linesman_proto::port::Port;
+use linesman_proto::register::STATION_ADDRESS;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use linesman_proto::topology::End;
@@ -358,4 +359,40 @@ fn behind_a_break_a_device_without_power_comes_back() {
     bench.run_for(Span::s(10));
     assert!(bench.device.is_settled(), "{:#?}", bench.events);
     assert_eq!(bench.state("B2"), "OP");
+}
+
+/// Of two equal ones without power the second is back first, by the other card: it must not be taken for the first, whose outputs it would get.
+#[test]
+fn of_equal_devices_in_a_ring_the_one_that_comes_back_first_gets_its_own_address() {
+    let text = RING.replace("EP4174-0002", "EP2308-0001");
+    let mut bench = Bench::with_options(&text, Options { ring: true, ..Options::default() });
+    let inventory = bench.scan();
+    let mut planned = inventory.planned(AlState::Op);
+    for device in &mut planned {
+        device.identity.serial_number = 0;
+    }
+    let options = PlanOptions::default();
+    let plan = Plan::build(&planned, inventory.tree().clone(), &options).unwrap();
+    bench.device.start(bench.now, plan);
+    assert!(bench.run_until(Span::s(20), |event| matches!(event, Event::AllReached)));
+    let station = |bench: &Bench, name: &str| {
+        let controller = bench.segment.controller(bench.id(name)).unwrap();
+        [0, 1].map(|at| controller.register(RegisterAddress(STATION_ADDRESS.address.0 + at)))
+    };
+    let names = ["B2", "B3"];
+    let planned = names.map(|name| station(&bench, name));
+    let mut off = names.map(|name| {
+        let entry = FaultEntry::new("device-off".parse().unwrap()).device(name);
+        Some(bench.segment.inject(bench.now, &entry).unwrap())
+    });
+    bench.run_for(Span::s(1));
+    for (back, are_back) in [(1, &[1][..]), (0, &[0, 1])] {
+        bench.segment.heal(bench.now, off[back].take().unwrap());
+        bench.run_for(Span::s(10));
+        for at in are_back.iter().copied() {
+            let name = names[at];
+            assert_eq!(station(&bench, name), planned[at], "{name}: {:#?}", bench.events);
+            assert_eq!(bench.state(name), "OP", "{name}");
+        }
+    }
 }
