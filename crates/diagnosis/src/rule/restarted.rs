@@ -38,7 +38,7 @@ use linesman_proto::topology::End;
 
 use super::{Rule, RulePage, View, link_lost};
 use crate::finding::{Condition, Evidence, Place, Severity, Symptom};
-use crate::model::{AlChange, AlError, Device, NetworkModel, Seen, is_on_terminal_bus};
+use crate::model::{Absence, AlChange, AlError, Device, NetworkModel, Seen, is_on_terminal_bus};
 
 /// Back in INIT.
 pub const RESTARTED: RulePage = RulePage {
@@ -110,6 +110,10 @@ impl Fall<'_> {
         let node = self.device.id.index();
         let above = model.tree.as_ref().filter(|tree| node < tree.len());
         let above = above.and_then(|tree| tree.upstream(node)?.node());
+        // An outage in front of it hides how long it was away.
+        if above.is_some_and(|above| was_cut_off(&model.devices[above], since, until)) {
+            return false;
+        }
         let is_alone = !together.iter().any(|other| Some(other.device.id.index()) == above);
         // Who starts anew again and again has a supply that dips again and again.
         let falls = self.device.al.changes.iter().filter(|change| change.is_own_fall()).count();
@@ -123,6 +127,17 @@ impl Fall<'_> {
         };
         until.since(since) >= bound
     }
+}
+
+/// True if a SubDevice that kept its supply did not answer in all of this time.
+fn was_cut_off(device: &Device, since: Instant, until: Instant) -> bool {
+    let has_fallen =
+        device.al.changes.iter().any(|change| change.is_own_fall() && change.at >= since);
+    let covers = |absence: &Absence| {
+        absence.since.at <= since + TOGETHER
+            && absence.ended.is_none_or(|ended| ended + TOGETHER >= until)
+    };
+    !has_fallen && device.joined_absences().iter().any(covers)
 }
 
 fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
