@@ -11,7 +11,7 @@
 //! Nobody reads these registers all the time: live, the diagnosis asks for them by turns. A clock that goes off
 //! while no frame comes round, or none that hands the time of the reference round, by no more than a sound quartz
 //! does in that time, was left alone and is well; so is one that goes off when the reference clock does not
-//! answer, or is in the other half of a ring.
+//! answer, within two seconds after that, or is in the other half of a ring.
 //!
 //! **What it means.** Control in the controller follows quartzes that are off by some hundreds of parts per
 //! million, and sound ones are off by fifty at most. Heat and damage make it more. The SYNC signals of the
@@ -89,7 +89,8 @@ fn was_silent(device: &Device, astray: &ClockDeviation) -> bool {
     let began = |since: Instant| since <= astray.far.at;
     device.silent.is_some_and(|silent| began(silent.at))
         || device.absences.iter().any(|absence| {
-            began(absence.since.at) && absence.ended.is_none_or(|ended| ended >= astray.near.at)
+            let is_over = absence.ended.is_some_and(|ended| ended + PULLED_IN < astray.near.at);
+            began(absence.since.at) && !is_over
         })
 }
 

@@ -199,20 +199,31 @@ fn a_clock_to_which_nobody_hands_a_time_is_well_likewise() {
 
 // silent: T420
 #[test]
-fn clocks_that_go_off_when_the_reference_does_not_answer_were_led_astray() {
-    for is_silent in [false, true] {
+fn clocks_that_go_off_when_the_reference_does_not_answer_or_has_just_come_back_were_led_astray() {
+    // Whether the reference was silent, and for how many cycles it has answered again.
+    for (was_silent, back_for, is_told) in [
+        (false, None, true),
+        (true, None, false),
+        (true, Some(20), false),
+        (true, Some(2_500), true),
+    ] {
         let mut plant = plant();
         plant.ahead(0x1002, 60);
-        if is_silent {
+        if was_silent {
             for _ in 0..5 {
                 plant.script.exchange(&[fprd(0x1001, 0x0130, &[0; 6]).wkc(0)]);
                 plant.cycles(20);
             }
         }
+        if let Some(cycles) = back_for {
+            plant.script.exchange(&[fprd(0x1001, 0x0130, &[8, 0, 0, 0, 0, 0])]);
+            plant.cycles(cycles);
+            plant.ahead(0x1002, 60);
+        }
         plant.ahead(0x1002, 900_000);
         plant.cycles(100);
         let report = plant.report();
-        assert_eq!(codes(&report).contains(&"T420"), !is_silent, "{}", text(&report));
+        assert_eq!(codes(&report).contains(&"T420"), is_told, "{back_for:?} {}", text(&report));
     }
 }
 
