@@ -11,7 +11,8 @@ use crate::finding::{Condition, Evidence, Place, Symptom};
 use crate::model::{Device, NetworkModel, Seen};
 
 /// The port by which frames come in, where it is not the one that should be: that has no link, another one has, and
-/// the SubDevice answers. Not in a ring, whose SubDevices are reached from both sides.
+/// the SubDevice answers. Not in a ring, whose SubDevices are reached from both sides; but the first one is reached by card A where
+/// somebody processes its copies, all of them or those of either card.
 pub(in crate::rule) fn entered_otherwise(model: &NetworkModel, device: &Device) -> Option<Port> {
     let tree = model.tree.as_ref();
     let traffic = &model.traffic;
@@ -23,7 +24,13 @@ pub(in crate::rule) fn entered_otherwise(model: &NetworkModel, device: &Device) 
     let is_there = device.answered.is_some() && device.silent.is_none();
     let wanted = wanted(model, device);
     // Where positions may have moved, a plan with another entry is for the comparison with it.
-    if is_ring || !is_there || (wanted != Port::A && traffic.recording.frames() > 0) {
+    let is_first = matches!(model.opposite(device.id, wanted), Some(End::MainDevice(Path::A)));
+    let by_either = traffic.broadcasts.split().map(|split| split.at);
+    let by_a = traffic.broadcasts.processed_alone().filter(|alone| alone.value == Path::A);
+    let reached = by_either.max(by_a.map(|alone| alone.at));
+    let is_reached = is_first && reached.is_some_and(|at| at >= status.at);
+    let is_either = is_ring && !is_reached;
+    if is_either || !is_there || (wanted != Port::A && traffic.recording.frames() > 0) {
         return None;
     }
     let has_link = |port: Port| status.value.port_state(port).link;
