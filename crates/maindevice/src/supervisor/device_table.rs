@@ -116,6 +116,8 @@ pub(crate) struct DeviceTable {
     pub(crate) opened_until: Instant,
     /// The delays that clocks were told are those of the line as it is; `None` where nobody measures them again.
     pub(super) delays_known: Option<bool>,
+    /// The ring has become whole again, and delays were not measured since.
+    pub(super) ring_mended: bool,
     /// Count of the times that clocks were told other delays than they had.
     pub(super) delays_told: u64,
     /// Of the half of an open ring without the reference, the clock whose delay stayed as it was then.

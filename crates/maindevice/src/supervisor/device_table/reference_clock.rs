@@ -110,6 +110,7 @@ impl DeviceTable {
     /// The ring is whole again: what has changed in one half meanwhile, the other one does not know.
     pub(crate) fn note_ring_whole(&mut self) {
         if self.delays_known.is_some() {
+            self.ring_mended = true;
             self.set_delays_known(false);
             self.alert();
         }
