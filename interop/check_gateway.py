@@ -57,7 +57,7 @@ def every_protocol_but_eoe_passes_the_gateway(line):
     # The vendor; a file that is not there; a drive without this IDN (0x1001), and a terminal without VoE, which say so themselves.
     assert told["coe"] == {"kind": 3, "body": "003043181001" + "02000000"}, told["coe"]
     assert told["foe"]["kind"] == 4 and told["foe"]["body"][:2] == "05", told["foe"]
-    assert told["soe"] == {"kind": 5, "body": "124033000110"}, told["soe"]
+    assert told["soe"] == {"kind": 5, "body": "124034000110"}, told["soe"]
     assert told["voe"] == {"kind": 0, "body": "01000200"}, told["voe"]
     assert told["eoe"] is None, told["eoe"]
     assert gateway.counts["refused"] == {"protocol": 1} and gateway.counts["answers"] == 4, gateway.counts

@@ -26,8 +26,8 @@ def main():
     for counter, (name, kind, station, body) in enumerate([
         ("coe", COE, terminal, struct.pack("<HBHBI", 0x2000, 0x40, 0x1018, 1, 0)),
         ("foe", FOE, terminal, struct.pack("<BBI", 1, 0, 0) + b"nothing.txt"),
-        # S-0-0051, its value.
-        ("soe", SOE, drive, bytes([0x01, 0x40, 51, 0])),
+        # S-0-0052, its value.
+        ("soe", SOE, drive, bytes([0x01, 0x40, 52, 0])),
         ("voe", VOE, terminal, bytes(8)),
         # What its IP parameters are.
         ("eoe", EOE, terminal, bytes([0x06, 0x01, 0, 0])),

@@ -5,7 +5,7 @@ use clap::{Parser, Subcommand};
 use crate::command::{
     aoe, bundle, capture, completion, counters, demo, diagnose, explain, fault, foe, history, host,
     id, interfaces, lab, log, online, plan, probe, reg, ring, run, scan, schema, sdo, sii, sim,
-    state,
+    soe, state,
 };
 use crate::version::VERSION;
 
@@ -74,6 +74,8 @@ pub(crate) enum Command {
     Foe(foe::Arguments),
     /// A SubDevice asked by ADS through its mailbox: name, state, index groups, NetId
     Aoe(aoe::Arguments),
+    /// Identification numbers (IDN) of a drive by SoE: list, read, write, procedure commands
+    Soe(soe::Arguments),
     /// EEPROM of a SubDevice: read, write, compare, station alias
     Sii(sii::Arguments),
     /// Numbers that tell equal SubDevices apart: read, compared with a project, set
@@ -125,6 +127,7 @@ impl Command {
             Self::History(arguments) => Some(&arguments.place.line),
             Self::Foe(arguments) => Some(&arguments.place.line),
             Self::Aoe(arguments) => Some(&arguments.place.line),
+            Self::Soe(arguments) => Some(&arguments.place.line),
             Self::Sii(arguments) => Some(&arguments.place.line),
             Self::Reg(arguments) => Some(&arguments.place.line),
             Self::Id(arguments) => Some(&arguments.line),
@@ -166,6 +169,7 @@ impl Command {
             Self::History(arguments) => arguments.json,
             Self::Foe(arguments) => arguments.json,
             Self::Aoe(arguments) => arguments.json,
+            Self::Soe(arguments) => arguments.json,
             Self::Sii(arguments) => arguments.json,
             Self::Reg(arguments) => arguments.json,
             Self::Counters(arguments) => arguments.json,

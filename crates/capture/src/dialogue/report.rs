@@ -48,7 +48,7 @@ pub struct TransferReport {
     pub size: Number,
     /// The data as hexadecimal digits, at most 4,096 bytes.
     pub data: String,
-    /// Meaning of the data, name of a file, or reason.
+    /// Meaning of the data, name of a file, or reason; of SoE the elements and the drive: `value of drive 0`.
     pub text: Option<String>,
     /// The end it came to.
     pub outcome: TransferOutcome,

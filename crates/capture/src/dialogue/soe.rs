@@ -1,7 +1,7 @@
 //! Parameters of drives (IDNs) that are read and written.
 
 use linesman_proto::mailbox::coe::ObjectAddress;
-use linesman_proto::mailbox::soe::{Idn, Message, Operation};
+use linesman_proto::mailbox::soe::{Message, Operation, elements_in_words};
 
 use super::report::{MailboxProtocol, TransferOutcome};
 use super::transfer::Store;
@@ -22,7 +22,14 @@ pub(super) fn message(
         Operation::Reserved(_) => return,
     };
     if matches!(told.operation, Operation::Notification | Operation::Emergency) {
-        return store.single(message, MailboxProtocol::SoE, what);
+        let index = store.open(message, MailboxProtocol::SoE, what);
+        if let Some(transfer) = store.get(index) {
+            transfer.object = Some(ObjectAddress::new(told.number, 0));
+            transfer.text = Some(about(&told));
+            transfer.push(told.data);
+            transfer.outcome = TransferOutcome::Told;
+        }
+        return;
     }
     let is_answer = matches!(told.operation, Operation::ReadResponse | Operation::WriteResponse);
     let is_open = store.get(mailbox.soe).is_some_and(|open| {
@@ -36,11 +43,11 @@ pub(super) fn message(
     // Of a part the number says how many follow.
     if !told.incomplete {
         transfer.object = Some(ObjectAddress::new(told.number, 0));
-        transfer.text = Some(format!("{}, drive {}", Idn(told.number), told.drive));
+        transfer.text = Some(about(&told));
     }
     let carries = matches!(told.operation, Operation::ReadResponse | Operation::WriteRequest);
     if let Some(refusal) = told.refusal() {
-        transfer.text = Some(format!("{}: {}", Idn(told.number), refusal.text()));
+        transfer.text = Some(format!("{}: {}", about(&told), refusal.text()));
         transfer.end(message.when, TransferOutcome::Refused, Some(u32::from(refusal.0)));
         mailbox.soe = None;
         return;
@@ -57,4 +64,9 @@ pub(super) fn message(
         (false, true) => transfer.outcome = TransferOutcome::Unfinished,
         (false, false) => transfer.outcome = TransferOutcome::Unanswered,
     }
+}
+
+/// Elements and drive, in words.
+fn about(message: &Message<'_>) -> String {
+    format!("{} of drive {}", elements_in_words(message.elements), message.drive)
 }

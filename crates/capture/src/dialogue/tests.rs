@@ -224,6 +224,50 @@ fn drive_parameter_that_is_refused_says_why() {
     let one = bench.only();
     assert_eq!((one.what.as_str(), one.outcome), ("read-idn", TransferOutcome::Refused));
     assert_eq!((one.index, one.code), (Some(32), Some(0x7009)));
+    let text = one.text.as_deref();
+    assert_eq!(text, Some("value of drive 0: it is write-protected by a password"));
+}
+
+#[test]
+fn drive_parameter_is_told_with_its_element_and_its_data_put_together() {
+    let mut bench = Bench::new();
+    let message = |operation, incomplete, number, data| soe::Message {
+        operation,
+        incomplete,
+        error: false,
+        drive: 1,
+        elements: soe::NAME,
+        number,
+        data,
+    };
+    let ask = message(soe::Operation::ReadRequest, false, 36, &[]);
+    bench.told(MailboxType::Soe, true, |body| ask.write(body));
+    let first = message(soe::Operation::ReadResponse, true, 1, &[3, 0, 3, 0]);
+    bench.told(MailboxType::Soe, false, |body| first.write(body));
+    let last = message(soe::Operation::ReadResponse, false, 36, b"abc");
+    bench.told(MailboxType::Soe, false, |body| last.write(body));
+    let one = bench.only();
+    assert_eq!((one.index, one.outcome), (Some(36), TransferOutcome::Done));
+    assert_eq!((one.text.as_deref(), one.messages), (Some("name of drive 1"), 3));
+    assert_eq!(one.data, "03000300616263");
+}
+
+#[test]
+fn notification_of_a_drive_is_told_with_its_number() {
+    let mut bench = Bench::new();
+    let told = soe::Message {
+        operation: soe::Operation::Notification,
+        incomplete: false,
+        error: false,
+        drive: 0,
+        elements: soe::DATA_STATE,
+        number: 99,
+        data: &[3, 0],
+    };
+    bench.told(MailboxType::Soe, false, |body| told.write(body));
+    let one = bench.only();
+    assert_eq!((one.what.as_str(), one.outcome), ("notification", TransferOutcome::Told));
+    assert_eq!((one.index, one.data.as_str()), (Some(99), "0300"));
 }
 
 #[test]

@@ -30,6 +30,7 @@ pub(crate) mod sdo;
 pub(crate) mod service;
 pub(crate) mod sii;
 pub(crate) mod sim;
+pub(crate) mod soe;
 pub(crate) mod state;
 
 use crate::cli::Command;
@@ -60,6 +61,7 @@ pub(crate) fn run(command: Command, output: &mut Output) -> Result<Status, Failu
         Command::History(arguments) => history::run(&arguments, output),
         Command::Foe(arguments) => foe::run(&arguments, output),
         Command::Aoe(arguments) => aoe::run(&arguments, output),
+        Command::Soe(arguments) => soe::run(&arguments, output),
         Command::Sii(arguments) => sii::run(&arguments, output),
         Command::Counters(arguments) => counters::run(&arguments, output),
         Command::Probe(arguments) => probe::run(&arguments, output),

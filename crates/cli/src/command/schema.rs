@@ -26,7 +26,8 @@ use super::run::several::RunReports;
 use super::scan::report::Scan;
 use super::sdo::report::{ListReport, ReadReport};
 use super::{
-    aoe, capture, counters, explain, foe, history, host, id, probe, reg, ring, service, sii, state,
+    aoe, capture, counters, explain, foe, history, host, id, probe, reg, ring, service, sii, soe,
+    state,
 };
 use crate::exit::Status;
 use crate::failure::{ErrorReport, Failure};
@@ -121,6 +122,8 @@ pub(crate) enum Name {
     File,
     /// `aoe --json`
     Ads,
+    /// `soe --json`
+    Soe,
     /// `sii --json`
     Sii,
     /// `counters --json`
@@ -182,6 +185,7 @@ fn schema(name: Name) -> Schema {
         Name::History => schema_for!(history::Report),
         Name::File => schema_for!(foe::Report),
         Name::Ads => schema_for!(aoe::Report),
+        Name::Soe => schema_for!(soe::report::Report),
         Name::Sii => schema_for!(sii::Report),
         Name::Counters => schema_for!(counters::Report),
         Name::Probe => schema_for!(probe::Report),

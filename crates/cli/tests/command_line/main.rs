@@ -30,6 +30,7 @@ mod cycle_time;
 mod device_names;
 mod device_table;
 mod drawings;
+mod drive_numbers;
 mod ending;
 mod eni_project;
 mod ethernet;

@@ -30,7 +30,7 @@ type = "EL6601"
 on = "M2.B"
 "#;
 
-struct Plant {
+pub(crate) struct Plant {
     directory: TempDir,
 }
 
@@ -39,7 +39,7 @@ impl Plant {
         Self::with(PLANT)
     }
 
-    fn with(toml: &str) -> Self {
+    pub(crate) fn with(toml: &str) -> Self {
         let plant = Self { directory: TempDir::new().unwrap() };
         std::fs::write(plant.path("plant.toml"), toml).unwrap();
         plant
@@ -50,13 +50,13 @@ impl Plant {
     }
 
     /// Runs `linesman COMMAND sim:plant.toml REST…`.
-    fn run(&self, command: &str, rest: &[&str]) -> Run {
+    pub(crate) fn run(&self, command: &str, rest: &[&str]) -> Run {
         let place = format!("sim:{}", self.path("plant.toml").display());
         linesman([&[command, &place], rest].concat())
     }
 
     /// The same with `--json`, valid by the schema of this name.
-    fn json(&self, command: &str, rest: &[&str], schema: &str, status: i32) -> Value {
+    pub(crate) fn json(&self, command: &str, rest: &[&str], schema: &str, status: i32) -> Value {
         let run = self.run(command, &[rest, &["--json"]].concat());
         assert_eq!(run.status, status, "{}", run.all());
         let json = run.json();

@@ -2,7 +2,7 @@
 //!
 //! One multiplexer per SubDevice owns its mailbox: it counts messages, looks whether there is
 //! one to be fetched, fetches lost ones again, and hands them on by type. `coe`, `information`,
-//! `foe`, `settings`, `aoe`, `voe` and `pass` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
+//! `foe`, `settings`, `soe`, `aoe`, `voe` and `pass` are its clients; jobs ([`MailboxRequest`]) wait in a queue and are done one after
 //! another; `ethernet` sends frames for the virtual switch. Emergencies and messages that nobody asked for become events; what went wrong is kept
 //! ([`ProtocolErrors`]).
 
@@ -20,6 +20,7 @@ mod protocol_errors;
 pub(crate) mod queue;
 mod request;
 mod settings;
+mod soe;
 pub(crate) mod transaction;
 mod voe;
 

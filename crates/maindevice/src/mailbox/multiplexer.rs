@@ -52,6 +52,8 @@ pub(crate) struct Multiplexer {
     received: Counter,
     /// A message was asked for again: what comes may be one that we have had.
     fetched_again: bool,
+    /// A message is missing: its frame was lost, and the next one was in the mailbox already.
+    missing: bool,
     /// An operation was given up whose answer may still come.
     late: bool,
     /// What came during this operation that is no message: how often, and the last of it in words.
@@ -85,6 +87,7 @@ impl Multiplexer {
             sent: None,
             received: Counter::NONE,
             fetched_again: false,
+            missing: false,
             late: false,
             rubbish: None,
             passed: PassedTransfer::default(),
@@ -101,7 +104,7 @@ impl Multiplexer {
     /// The SubDevice begins anew, and so does counting.
     pub(crate) fn reset(&mut self) {
         (self.sent, self.received) = (None, Counter::NONE);
-        (self.fetched_again, self.late) = (false, false);
+        (self.fetched_again, self.missing, self.late) = (false, false, false);
         self.passed = PassedTransfer::default();
         self.fragments = UnansweredFragments::default();
     }
@@ -184,6 +187,7 @@ impl Multiplexer {
     /// An operation begins. What is left of one that was given up is fetched first.
     pub(crate) async fn begin(&mut self) {
         self.rubbish = None;
+        self.missing = false;
         if self.late {
             self.drain().await;
         }
@@ -197,6 +201,11 @@ impl Multiplexer {
     /// Whether an answer may be that to an operation which was given up.
     pub(crate) fn may_be_late(&self) -> bool {
         self.late
+    }
+
+    /// Whether a message has gone missing since the last call.
+    pub(crate) fn take_missing(&mut self) -> bool {
+        std::mem::take(&mut self.missing)
     }
 
     /// What was waited for has come, though late.
@@ -329,6 +338,7 @@ impl Multiplexer {
             return Ok(None);
         }
         let area = self.areas.send;
+        let mut uncertain = false;
         for _ in 0..3 {
             let read = Request::read(self.target, area.offset, area.size);
             match self.wire.submit(read).await {
@@ -341,6 +351,7 @@ impl Multiplexer {
                     if again && counter.repeats(self.received) {
                         return Ok(None);
                     }
+                    self.missing |= uncertain && counter.skips(self.received);
                     self.received = counter;
                     return Ok(Some(reply.data.into_vec()));
                 }
@@ -349,6 +360,7 @@ impl Multiplexer {
                 // The frame got lost on its way there or back. If the message is gone from the
                 // mailbox, the SubDevice is asked to put it in again.
                 Err(ExchangeError::NoReply { .. }) => {
+                    uncertain = true;
                     if !self.is_full(IN).await? {
                         self.repetitions = self.repetitions.wrapping_add(1);
                         self.fetched_again = true;

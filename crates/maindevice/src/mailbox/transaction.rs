@@ -8,6 +8,7 @@ use super::failure::{MailboxFailure, Step, Why};
 use super::multiplexer::Multiplexer;
 use super::progress::{FileBusy, FileProgress, PROGRESS_INTERVAL};
 use super::request::MailboxRequest;
+use super::soe::{self, IdnElements};
 use super::{aoe, coe, ethernet, foe, information, pass, settings, voe};
 
 /// A SubDevice that writes what it got into its flash memory answers late: a file takes more patience
@@ -90,11 +91,13 @@ impl MailboxTransaction<'_> {
                 ethernet::send_frame(self, *port, *number, frame).await
             }
             MailboxRequest::ReadIdn { drive, idn, elements } => {
-                settings::read_idn(self, *drive, *elements, *idn).await
+                let (drive, idn, elements) = (*drive, *idn, *elements);
+                soe::read(self, IdnElements { drive, idn, elements }).await
             }
             MailboxRequest::WriteIdn { drive, idn, elements, data } => {
-                let written = settings::write_idn(self, *drive, *elements, idn.0, data).await;
-                written.map(|()| Vec::new())
+                let (drive, idn, elements) = (*drive, *idn, *elements);
+                let about = IdnElements { drive, idn, elements };
+                soe::write(self, about, data).await.map(|()| Vec::new())
             }
             MailboxRequest::ReadFile { name, password } => foe::read(self, name, *password).await,
             MailboxRequest::WriteFile { name, password, data } => {

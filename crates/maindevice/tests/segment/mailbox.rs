@@ -2,10 +2,8 @@
 
 use crate::bench::{Bench, Fate};
 use linesman_maindevice::Event;
-use linesman_maindevice::mailbox::{MailboxFailure, MailboxRequest, Why};
-use linesman_maindevice::service::{Service, ServiceAnswer};
+use linesman_maindevice::mailbox::{MailboxFailure, Why};
 use linesman_proto::mailbox::coe::ObjectAddress;
-use linesman_proto::mailbox::soe::{ALL_NUMBERS, Idn, VALUE, numbers_of_list};
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 
@@ -123,31 +121,4 @@ fn lost_frames_neither_double_nor_lose_messages() {
         assert_eq!(upload(&mut bench, "M1", 0x8010, 1).unwrap(), value, "round {round}");
         assert_eq!(upload(&mut bench, "A1", 0x1008, 0).unwrap(), b"EL3102", "round {round}");
     }
-}
-
-#[test]
-fn numbers_of_a_drive_are_listed_and_read_and_a_missing_one_is_refused() {
-    let mut bench = Bench::new(
-        "name = \"drive\"\n[[device]]\nname = \"X1\"\ntype = \"AX5103-0012\"\non = \"maindevice\"\n",
-    );
-    bench.start(AlState::PreOp);
-    let id = bench.id("X1");
-    let mut read = |idn, elements| {
-        let request = MailboxRequest::ReadIdn { drive: 0, idn, elements };
-        bench.events.clear();
-        bench.device.serve(bench.now, id, Service::Mailbox(request));
-        assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::Served { .. })));
-        match bench.events.pop() {
-            Some((_, Event::Served { result, .. })) => *result,
-            other => panic!("{other:?}"),
-        }
-    };
-    let Ok(ServiceAnswer::Data(list)) = read(ALL_NUMBERS, VALUE) else { panic!("no list") };
-    let numbers = numbers_of_list(&list).expect("a list");
-    assert_eq!(numbers[0], ALL_NUMBERS);
-    for idn in numbers {
-        assert!(matches!(read(idn, VALUE), Ok(ServiceAnswer::Data(_))), "{idn}");
-    }
-    let failure = read(Idn(51), VALUE).unwrap_err().to_string();
-    assert!(failure.contains("S-0-0051") && failure.contains("0x1001"), "{failure}");
 }

@@ -32,6 +32,7 @@ mod rounds;
 mod run;
 mod scan;
 mod soak;
+mod soe;
 mod software;
 mod start_up;
 mod synchronisation;

@@ -2,9 +2,19 @@
 //!
 //! Read first: ETG.1000.6, SoE; IEC 61800-7-204 for what IDNs are; facts 6.7.
 
+mod attribute;
+mod element;
+
 use std::fmt;
 
 use super::header::BufferTooSmall;
+
+pub use attribute::{DisplayFormat, SoeAttribute, ValueLength};
+pub use element::{
+    ALL_COMMANDS, ALL_NUMBERS, ATTRIBUTE, CommandProgress, CommandState, DATA_STATE, DEFAULT,
+    ELEMENTS, LIST_HEADER_LEN, MAXIMUM, MINIMUM, NAME, UNIT, VALUE, VariableData,
+    elements_in_words, numbers_of_list,
+};
 
 /// Bytes in front of the data.
 pub const SOE_HEADER_LEN: usize = 4;
@@ -13,24 +23,6 @@ const OPERATION: u8 = 0x07;
 const INCOMPLETE: u8 = 0x08;
 const ERROR: u8 = 0x10;
 const DRIVE_AT: u32 = 5;
-
-/// The element "value" of an IDN.
-pub const VALUE: u8 = 0x40;
-
-/// IDN S-0-0017: the list of all IDNs of the drive.
-pub const ALL_NUMBERS: Idn = Idn(17);
-/// Bytes in front of a list: the length of it now, and the most it can have.
-const LIST_HEADER_LEN: usize = 4;
-
-/// IDNs of a list, such as the value of [`ALL_NUMBERS`]; `None` where it is shorter than it says.
-///
-/// Reference: IEC 61800-7-204, data of variable length: two lengths in bytes, two bytes each, then the elements.
-#[must_use]
-pub fn numbers_of_list(value: &[u8]) -> Option<Vec<Idn>> {
-    let ([low, high, _, _], list) = value.split_first_chunk::<LIST_HEADER_LEN>()?;
-    let list = list.get(..usize::from(u16::from_le_bytes([*low, *high])))?;
-    Some(list.as_chunks().0.iter().map(|number| Idn(u16::from_le_bytes(*number))).collect())
-}
 
 /// What is asked or answered.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -115,7 +107,7 @@ pub struct Message<'a> {
     pub error: bool,
     /// Which drive of the device, 0..=7.
     pub drive: u8,
-    /// Which elements: [`VALUE`], 0x02 name, 0x04 attribute, 0x08 unit, 0x10 minimum, 0x20 maximum.
+    /// Which elements, by their bits: [`ELEMENTS`].
     pub elements: u8,
     /// The IDN, or how many messages follow.
     pub number: u16,
@@ -244,15 +236,6 @@ mod tests {
         assert_eq!(refused.refusal(), Some(SoeError(0x7004)));
         assert_eq!(refused.refusal().unwrap().to_string(), "0x7004 it cannot be changed");
         assert_eq!(Message::parse(&[1, 2, 3]), None);
-    }
-
-    #[test]
-    fn list_of_numbers_is_as_long_as_it_says() {
-        let list = [4, 0, 8, 0, 17, 0, 1, 0x80, 9, 9];
-        assert_eq!(numbers_of_list(&list), Some(vec![ALL_NUMBERS, Idn(0x8001)]));
-        assert_eq!(numbers_of_list(&list[..7]), None);
-        assert_eq!(numbers_of_list(&[0, 0, 0]), None);
-        assert_eq!(numbers_of_list(&[0, 0, 0, 0]), Some(Vec::new()));
     }
 
     #[test]

@@ -188,7 +188,9 @@ pub(crate) fn show(data: &[u8], data_type: Option<DataType>) -> (String, Value) 
             let value = serde_json::Number::from_f64(number);
             (number.to_string(), value.map_or(Value::Null, Value::Number))
         }),
-        Some(Form::Text) => text(data).map(|text| (format!("\"{text}\""), Value::String(text))),
+        Some(Form::Text) => {
+            printable(data).map(|text| (format!("\"{text}\""), Value::String(text)))
+        }
         Some(Form::WideText) => {
             let letters = data.as_chunks::<2>().0.iter().map(|two| u16::from_le_bytes(*two));
             let text = String::from_utf16_lossy(&letters.collect::<Vec<_>>());
@@ -205,11 +207,11 @@ fn untyped(data: &[u8]) -> Option<(String, Value)> {
         let (number, width) = (unsigned(data), 2 * data.len());
         return Some((format!("{number} (0x{number:0width$X})"), number_value(number.into())));
     }
-    text(data).map(|text| (format!("\"{text}\""), Value::String(text)))
+    printable(data).map(|text| (format!("\"{text}\""), Value::String(text)))
 }
 
 /// Printable text, but for zeros at its end.
-fn text(data: &[u8]) -> Option<String> {
+pub(crate) fn printable(data: &[u8]) -> Option<String> {
     let len = data.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
     let text = std::str::from_utf8(&data[..len]).ok()?;
     (!text.chars().any(char::is_control)).then(|| text.to_owned())
@@ -220,7 +222,7 @@ fn unsigned(data: &[u8]) -> u64 {
 }
 
 /// Above 2^53 programs that read JSON lose digits: then it is a text.
-fn number_value(number: i128) -> Value {
+pub(crate) fn number_value(number: i128) -> Value {
     const SAFE: i128 = 1 << 53;
     match i64::try_from(number) {
         Ok(small) if (-SAFE..=SAFE).contains(&number) => Value::from(small),

@@ -2,6 +2,7 @@
 
 use linesman_maindevice::service::RefusalKind;
 use linesman_proto::address::DeviceId;
+use linesman_proto::mailbox::soe::SoeError;
 use serde::Serialize;
 
 use super::DeviceReport;
@@ -27,7 +28,8 @@ pub(crate) struct Report {
     tool: String,
     /// Who refuses.
     device: DeviceReport,
-    /// What kind of code it is: `sdo-abort`, `foe-error`, `mailbox-error`, `al-status`.
+    /// What kind of code it is: `sdo-abort`, `foe-error`, `soe-error`, `ads-error`, `mailbox-error`,
+    /// `al-status`.
     kind: String,
     /// The SubDevice's own code.
     code: u32,
@@ -58,6 +60,12 @@ impl Refusal {
             next_step,
         };
         Self { failure: told, report }
+    }
+
+    /// The code, if a drive refuses an IDN.
+    pub(crate) fn soe_error(&self) -> Option<SoeError> {
+        let code = u16::try_from(self.report.code).ok();
+        code.filter(|_| self.report.kind == RefusalKind::SoeError.name()).map(SoeError)
     }
 
     /// The code, if it is an SDO abort.

@@ -4,7 +4,7 @@ use linesman_capture::dialogue::{MailboxProtocol, TransferOutcome, TransferRepor
 use linesman_proto::mailbox::abort_code;
 use linesman_proto::mailbox::coe::ObjectIndex;
 use linesman_proto::mailbox::coe::standard_object::lookup;
-use linesman_proto::mailbox::soe::Idn;
+use linesman_proto::mailbox::soe::{Idn, LIST_HEADER_LEN, VariableData};
 
 use super::CaptureWriter;
 use crate::output::Table;
@@ -85,12 +85,27 @@ pub(crate) fn refusal(one: &TransferReport) -> String {
 
 /// Meaning of the data.
 fn said(one: &TransferReport) -> String {
+    if let Some(text) = one.text.as_ref().filter(|_| one.protocol == MailboxProtocol::SoE) {
+        let data = bytes(&one.data);
+        let told = match VariableData::parse(&data) {
+            Some(list)
+                if list.bytes.len() + LIST_HEADER_LEN == data.len() && is_text(list.bytes) =>
+            {
+                data_in_words(one, list.bytes, list.bytes.len() as u64)
+            }
+            Some(_) | None => data_in_words(one, &data, one.size.0),
+        };
+        return if told.is_empty() { text.clone() } else { format!("{text}: {told}") };
+    }
     if let Some(text) = &one.text {
         let code = one.code.map_or_else(String::new, |code| format!("0x{code:04X} "));
         return format!("{code}{text}");
     }
-    let bytes = bytes(&one.data);
-    match (bytes.as_slice(), one.size.0) {
+    data_in_words(one, &bytes(&one.data), one.size.0)
+}
+
+fn data_in_words(one: &TransferReport, bytes: &[u8], size: u64) -> String {
+    match (bytes, size) {
         ([], 0) => String::new(),
         (bytes, size) if is_text(bytes) || is_string(one) => {
             let text = String::from_utf8_lossy(bytes);
@@ -139,6 +154,28 @@ fn is_text(bytes: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn element_of_a_drive_is_told_with_its_data_or_its_refusal() {
+        let transfer = |outcome: &str, data: &str, text: &str| -> TransferReport {
+            serde_json::from_value(serde_json::json!({
+                "no": 2, "station": 0x1002, "position_no": null, "protocol": "SoE",
+                "what": "read-idn", "asked_ns": null, "asked_frame": null, "answered_ns": null,
+                "answered_frame": null, "messages": 2, "index": 36, "subindex": null,
+                "complete": false, "form": null, "size": data.len() / 2, "data": data,
+                "text": text, "outcome": outcome, "code": 0x7005,
+            }))
+            .unwrap()
+        };
+        let value = transfer("done", "05000000", "value of drive 0");
+        assert_eq!(what(&value), "SoE read-idn S-0-0036");
+        assert_eq!(said(&value), "value of drive 0: 0x00000005 (5)");
+        let name = transfer("done", "0400040073706565", "name of drive 0");
+        assert_eq!(said(&name), "name of drive 0: \"spee\"");
+        assert_eq!(said(&transfer("done", "", "value of drive 0")), "value of drive 0");
+        let refused = transfer("refused", "", "value of drive 0: it is write-protected");
+        assert_eq!(refusal(&refused), "refused 0x7005: value of drive 0: it is write-protected");
+    }
 
     #[test]
     fn data_are_text_where_all_letters_can_be_printed() {

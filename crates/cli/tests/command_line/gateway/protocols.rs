@@ -37,16 +37,16 @@ fn coe_soe_foe_and_voe_pass_and_eoe_does_not() {
     let running = Running::with(PROTOCOLS, &[("machine.toml", &project)]);
     let client = UdpClient::new(address);
     assert_eq!(client.number(FIRST, 0x1018, 1), 2);
-    // The drive has no IDN to show, and says so itself (SoE error 0x1001): S-0-0051 is read and written.
-    let (read, written) = ([0x01, 0x40, 51, 0], [0x03, 0x40, 51, 0, 9, 9]);
+    // The drive has no S-0-0052, and says so itself (SoE error 0x1001), read and written.
+    let (read, written) = ([0x01, 0x40, 52, 0], [0x03, 0x40, 52, 0, 9, 9]);
     let answer = client.ask(MailboxType::Soe, DRIVE, 4, &read);
-    assert_eq!(answer, [0x12, 0x40, 51, 0, 0x01, 0x10]);
+    assert_eq!(answer, [0x12, 0x40, 52, 0, 0x01, 0x10]);
     let answer = client.ask(MailboxType::Soe, DRIVE, 5, &written);
-    assert_eq!(answer, [0x14, 0x40, 51, 0, 0x01, 0x10]);
+    assert_eq!(answer, [0x14, 0x40, 52, 0, 0x01, 0x10]);
     let mut stream = TcpStream::connect(address).unwrap();
     let (header, data) = tcp_ask(&mut stream, &frame(MailboxType::Soe, DRIVE, 6, &read));
     assert_eq!((header.kind, header.counter.value()), (MailboxType::Soe, 6));
-    assert_eq!(data, [0x12, 0x40, 51, 0, 0x01, 0x10]);
+    assert_eq!(data, [0x12, 0x40, 52, 0, 0x01, 0x10]);
     let mut body = vec![0; 64];
     let len = FoeMessage::Read { password: 0, name: b"nothing.txt" }.write(&mut body).unwrap();
     let answer = client.ask(MailboxType::Foe, FIRST, 2, &body[..len]);

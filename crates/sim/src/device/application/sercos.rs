@@ -30,6 +30,8 @@ pub struct Sercos {
     command: ChannelValue,
     status: ChannelValue,
     feedback: ChannelValue,
+    velocity: ChannelValue,
+    velocity_limit: ChannelValue,
     control_word: u16,
     motion: Motion,
 }
@@ -46,6 +48,8 @@ impl Sercos {
             command: value(36),
             status: value(135),
             feedback: value(51),
+            velocity: value(40),
+            velocity_limit: value(91),
             control_word: 0,
             motion: Motion::at_rest(0.0),
         }
@@ -77,8 +81,10 @@ impl Channel for Sercos {
             let wanted = f64::from(self.command.get(dictionary) as u32 as i32);
             let runs = self.control_word & RESTART != 0;
             let wanted = if runs { wanted * POSITION_PER_VELOCITY } else { 0.0 };
+            let limit = self.velocity_limit.get(dictionary) as f64 * POSITION_PER_VELOCITY;
+            let limit = limit.min(LIMITS.velocity);
             Goal::Velocity {
-                target: wanted.clamp(-LIMITS.velocity, LIMITS.velocity),
+                target: wanted.clamp(-limit, limit),
                 acceleration: LIMITS.acceleration,
                 deceleration: LIMITS.acceleration,
             }
@@ -117,5 +123,7 @@ impl Channel for Sercos {
         };
         self.status.set(dictionary, u64::from(ready << 14));
         self.feedback.set(dictionary, self.position() as u64);
+        let velocity = (self.motion.velocity / POSITION_PER_VELOCITY).round() as i64;
+        self.velocity.set(dictionary, velocity.cast_unsigned());
     }
 }

@@ -11,6 +11,7 @@ use super::spec::{
     PdoSpec, ProcessorSpec, Rights, SettingSpec, SettingsSpec, Spec, SyncManagerSpec, VariableSpec,
 };
 use crate::device::dictionary::Object;
+use crate::device::mailbox::soe::parameter::BRAKE_DELAY;
 use crate::device::processor::ResponseTimes;
 use crate::hardware::PortKind::{Absent, Mii};
 
@@ -153,12 +154,19 @@ const SERCOS_PDOS: &[PdoSpec] = &[
     ),
 ];
 
+/// Parameters beyond the telegrams: the index is the IDN. The velocity limit is 100 turns per second.
+const SERCOS_VARIABLES: &[VariableSpec] = &[
+    variable(40, "Velocity feedback value 1", I32, 0, Rights::Read),
+    variable(91, "Bipolar velocity limit value", U32, 100 << 18, Rights::Setting),
+    variable(BRAKE_DELAY.0, "Switch-off delay of the brake", U16, 500, Rights::Setting),
+];
+
 const SERCOS_PROCESSOR: ProcessorSpec = ProcessorSpec {
     function: Function::Sercos,
     hardware_version: "",
     software_version: "",
     settings: &[],
-    variables: &[],
+    variables: SERCOS_VARIABLES,
     times: ResponseTimes::DRIVE,
 };
 

@@ -16,6 +16,7 @@ use super::synchronisation::{Clocked, synchronisation};
 use crate::device::application::bridge;
 use crate::device::dictionary::{Dictionary, Entry, Object, READ_ONLY, READ_WRITE, special};
 use crate::device::history;
+use crate::device::mailbox::soe::parameter::{NOTES, NOTES_LEN};
 
 /// Device type of modular devices (ETG.5001).
 const MODULAR_DEVICE: u64 = 0x0000_1389;
@@ -52,6 +53,9 @@ pub(super) fn dictionary(
     if let Function::Bridge { values } = processor.function {
         objects.push(crossing(bridge::OUTPUTS, "IO Outputs", Access::RX_PDO, values));
         objects.push(crossing(bridge::INPUTS, "IO Inputs", Access::TX_PDO, values));
+    }
+    if let Function::Sercos = processor.function {
+        objects.push(notes());
     }
     for pdo in spec.pdos {
         for channel in 0..pdo.channels {
@@ -90,6 +94,13 @@ fn crossing(index: u16, name: &str, direction: u16, values: u8) -> Object {
     };
     let entries = (1..=values).map(entry).collect();
     Object::list(ObjectIndex(index), name, ObjectCode::Array, DataType::UDINT, entries)
+}
+
+/// Notes in a drive that speaks SoE, which keeps them.
+fn notes() -> Object {
+    let text = Entry::text("Commissioning notes", "none");
+    let entry = Entry { bits: 8 * NOTES_LEN, access: SETTING, ..text };
+    Object::variable(ObjectIndex(NOTES.0), entry)
 }
 
 /// How devices react to errors. Subindex 1 is kept and has no function; 2 is how many missed events

@@ -11,7 +11,7 @@ mod foe;
 mod information;
 mod object_server;
 mod outbox;
-mod soe;
+pub(super) mod soe;
 mod voe;
 
 use std::collections::VecDeque;
@@ -31,6 +31,7 @@ pub use self::eoe::FragmentsLeftOut;
 use self::foe::FoeServer;
 pub use self::object_server::ObjectServer;
 use self::outbox::{Envelope, Outbox};
+use self::soe::SoeServer;
 use super::dictionary::Dictionary;
 use super::ethernet::EthernetSide;
 use super::files::Files;
@@ -71,6 +72,7 @@ pub struct Mailbox {
     coe: CoeServer,
     eoe: EoePort,
     foe: FoeServer,
+    soe: SoeServer,
     response_time: Span,
     /// The request that is worked on, and when that ends.
     request: Option<(Vec<u8>, Instant)>,
@@ -90,6 +92,7 @@ impl Mailbox {
             coe: CoeServer::default(),
             eoe: EoePort::default(),
             foe: FoeServer::default(),
+            soe: SoeServer::default(),
             response_time,
             request: None,
             last_received: Counter::NONE,
@@ -251,7 +254,8 @@ impl Mailbox {
                 self.eoe.answer(message.data, now, served.software_faults)
             }
             MailboxType::Soe if !boots && self.protocols.has(Protocols::SOE) => {
-                Ok(soe::answer(message.data, answer_room(pdi).saturating_sub(HEADER_LEN)))
+                let room = answer_room(pdi).saturating_sub(HEADER_LEN);
+                Ok(self.soe.answer(message.data, now, served, room))
             }
             // Nobody answers an error with an error.
             MailboxType::Error => return,

@@ -265,7 +265,7 @@ fn a_mapping_can_be_changed_before_safeop() {
 }
 
 #[test]
-fn a_drive_of_soe_moves_by_its_telegrams_and_has_no_idn_to_show() {
+fn a_drive_of_soe_moves_by_its_telegrams_and_shows_its_idns() {
     let mut device = Device::of("AX5103");
     device.bring_up();
     let mut told = Vec::new();
@@ -283,4 +283,28 @@ fn a_drive_of_soe_moves_by_its_telegrams_and_has_no_idn_to_show() {
     // One turn per second, for 200 ms.
     let position = i32::from_le_bytes(told[2..6].try_into().unwrap());
     assert!((200_000..=212_000).contains(&position), "{position}");
+    // What the application has is read by SoE: both words, position, velocity.
+    let mut value = |idn: u8| idn_value(&mut device, idn);
+    let now = i32::from_le_bytes(value(51).try_into().unwrap());
+    assert!((position..position + 10_000).contains(&now), "{position} {now}");
+    assert_eq!((value(134), value(135)), (vec![0x00, 0xE0], vec![0x00, 0xC0]));
+    assert_eq!((value(36), value(40)), (262_144_u32.to_le_bytes().to_vec(), value(36)));
+    // A velocity limit of a quarter of it.
+    device.post(&[8, 0, 0, 0, 0, 0x05, 0x03, 0x40, 91, 0, 0, 0, 1, 0]);
+    assert_eq!(device.fetch_soon().unwrap()[6..10], [0x04, 0x40, 91, 0]);
+    for _ in 0..200 {
+        let outputs = [&[0x00, 0xE0][..], &262_144i32.to_le_bytes()].concat();
+        device.exchange(&outputs);
+        device.bench.wait(Span::ms(1));
+    }
+    assert_eq!(idn_value(&mut device, 40), 65_536_u32.to_le_bytes());
+}
+
+/// The value of an S parameter of the drive.
+fn idn_value(device: &mut Device, idn: u8) -> Vec<u8> {
+    device.post(&[4, 0, 0, 0, 0, 0x05, 0x01, 0x40, idn, 0]);
+    let answer = device.fetch_soon().expect("an answer");
+    let message = Message::parse(&answer).unwrap();
+    assert_eq!(message.data[..4], [0x02, 0x40, idn, 0]);
+    message.data[4..].to_vec()
 }
