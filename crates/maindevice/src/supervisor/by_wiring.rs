@@ -76,8 +76,8 @@ fn card_of(seen: &[FoundController], range: &Range<usize>) -> Path {
     }
 }
 
-/// Which planned SubDevices the nodes of a found tree are of which nothing else is known: each hangs on one that is known, or on
-/// the card, and both ends of the cable are the planned ones.
+/// Nodes of a found tree of which nothing else is known, with the planned SubDevices that they are: each hangs on one that is known,
+/// or on the card, and both ends of the cable are the planned ones.
 fn place(
     planned: &Tree,
     found: &Tree,

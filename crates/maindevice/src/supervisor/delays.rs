@@ -74,7 +74,7 @@ pub(super) async fn keep_measured(context: Context) {
     }
 }
 
-/// Whether the ring has become whole since this was asked.
+/// True if the ring has become whole since this was asked.
 fn take_ring_mended(context: &Context) -> bool {
     std::mem::take(&mut lock(&context.device_table).ring_mended)
 }

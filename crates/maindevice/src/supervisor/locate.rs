@@ -41,11 +41,11 @@ pub(super) struct FoundController {
     pub(super) identity: Option<Identity>,
     /// It was found by its alias: it is no landmark, since it may be anywhere.
     pub(super) by_alias: bool,
-    /// Which of the plan hangs there, if the ports tell.
+    /// The one of the plan that hangs there, if the ports tell.
     pub(super) wired: Option<DeviceId>,
 }
 
-/// Which of several equal ones a found one is taken for, where fewer are found than are planned.
+/// Choice among several equal ones for a found one, where fewer are found than are planned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Equals {
     /// The first of them.
