@@ -20,14 +20,14 @@ use crate::output::Output;
 use idn::DriveClient;
 use report::{IdnReport, Report};
 
-/// What can be asked.
+/// Drive, action and form of the answer.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(crate) place: ServiceTarget,
     #[command(subcommand)]
     action: Action,
-    /// Which drive of the SubDevice
+    /// Drive of the SubDevice
     #[arg(long, global = true, value_name = "N", default_value = "0",
         value_parser = clap::value_parser!(u8).range(0..8))]
     drive: u8,

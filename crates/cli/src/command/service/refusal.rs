@@ -28,7 +28,7 @@ pub(crate) struct Report {
     tool: String,
     /// Who refuses.
     device: DeviceReport,
-    /// What kind of code it is: `sdo-abort`, `foe-error`, `soe-error`, `ads-error`, `mailbox-error`,
+    /// Kind of code: `sdo-abort`, `foe-error`, `soe-error`, `ads-error`, `mailbox-error`,
     /// `al-status`.
     kind: String,
     /// The SubDevice's own code.

@@ -23,11 +23,11 @@ pub(crate) struct Report {
     device: DeviceReport,
     /// `list`, `read`, `write` or `execute`.
     action: String,
-    /// Which drive of the SubDevice, 0 to 7.
+    /// Drive of the SubDevice, 0 to 7.
     drive: u8,
     /// One, or those of the list.
     pub(super) idns: Vec<IdnReport>,
-    /// How far a procedure command has come: `done`, `error`, `interrupted`, `still running`, `set, not enabled`,
+    /// Progress of a procedure command: `done`, `error`, `interrupted`, `still running`, `set, not enabled`,
     /// `not set`; `null` unless one was executed.
     pub(super) progress: Option<String>,
 }
@@ -44,7 +44,7 @@ pub(crate) struct IdnReport {
     pub(super) name: Option<String>,
     /// Unit of the value.
     pub(super) unit: Option<String>,
-    /// What its value is.
+    /// Kind of its value.
     pub(super) attribute: Option<AttributeReport>,
     /// The element that was read or written: `value` unless another was asked for.
     pub(super) element: String,
@@ -75,7 +75,7 @@ fn cut(text: &str) -> String {
     }
 }
 
-/// What the value of an IDN is.
+/// Kind of value of an IDN.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AttributeReport {
@@ -89,7 +89,7 @@ pub(crate) struct AttributeReport {
     decimals: u8,
     /// Factor that gives a value in its unit; `value` is without it.
     conversion_factor: u16,
-    /// Whether it is a procedure command.
+    /// True for a procedure command.
     command: bool,
     /// States in which it can be written: `PREOP, SAFEOP, OP`, `no state`.
     writable: String,
