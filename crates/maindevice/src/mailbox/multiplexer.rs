@@ -203,7 +203,7 @@ impl Multiplexer {
         self.late
     }
 
-    /// Whether a message has gone missing since the last call.
+    /// True if a message has gone missing since the last call.
     pub(crate) fn take_missing(&mut self) -> bool {
         std::mem::take(&mut self.missing)
     }

@@ -150,7 +150,7 @@ impl SoeAnswer {
         }
     }
 
-    /// Whether a message is this answer, or a part of it.
+    /// True if a message is this answer, or a part of it.
     fn is_met_by(&self, message: &Message<'_>) -> bool {
         let about = &self.about;
         message.operation == self.operation
