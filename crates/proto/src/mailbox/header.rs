@@ -224,7 +224,7 @@ impl Counter {
         self.0 != 0 && self.0 == last.0
     }
 
-    /// Whether one message is missing between the one with the counter `last` and this one.
+    /// True if one message is missing between the one with the counter `last` and this one.
     #[must_use]
     pub const fn skips(self, last: Self) -> bool {
         self.0 != 0 && last.0 != 0 && self.0 == last.next().next().0

@@ -107,7 +107,7 @@ pub struct Message<'a> {
     pub error: bool,
     /// Which drive of the device, 0..=7.
     pub drive: u8,
-    /// Which elements, by their bits: [`ELEMENTS`].
+    /// The elements, by their bits: [`ELEMENTS`].
     pub elements: u8,
     /// The IDN, or how many messages follow.
     pub number: u16,

@@ -97,7 +97,7 @@ impl SoeAttribute {
         (self.0 & 0xFFFF) as u16
     }
 
-    /// How long the value is.
+    /// Length of the value.
     #[must_use]
     pub const fn length(self) -> ValueLength {
         let bytes = 1 << (self.0 >> Self::LENGTH_AT & 0x3);
@@ -114,7 +114,7 @@ impl SoeAttribute {
         self.0 & Self::COMMAND != 0
     }
 
-    /// How the value is shown.
+    /// Form in which the value is shown.
     #[must_use]
     pub const fn format(self) -> DisplayFormat {
         match self.0 >> Self::FORMAT_AT & 0x7 {

@@ -139,7 +139,7 @@ impl CommandState {
         })
     }
 
-    /// How far the command has come.
+    /// Progress of the command.
     #[must_use]
     pub const fn progress(self) -> CommandProgress {
         let (error, waits) = (self.0 & Self::ERROR != 0, self.0 & Self::NOT_EXECUTED != 0);
