@@ -67,7 +67,7 @@ struct PartialWrite {
 #[derive(Debug)]
 struct SetCommand {
     idn: Idn,
-    /// What was written.
+    /// The value written.
     word: u16,
     since: Instant,
     /// It cannot be executed.

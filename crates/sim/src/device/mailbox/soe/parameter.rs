@@ -47,11 +47,11 @@ pub(super) enum ValueSource {
     AllNumbers,
     /// The list of all procedure commands.
     AllCommands,
-    /// What was written to a procedure command, which takes this time.
+    /// Value written to a procedure command, which takes this time.
     Command(Span),
 }
 
-/// What becomes of a write to the value.
+/// Outcome of a write to the value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum WriteRule {
     /// It cannot be changed.
