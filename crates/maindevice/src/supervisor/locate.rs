@@ -272,11 +272,11 @@ pub(super) async fn stretch(
     };
     let mut pairs: Vec<(usize, DeviceId)> =
         pairs.into_iter().map(|(at, of)| (at, planned[of])).collect();
+    let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     if equals == Equals::Beside && seen.len() != planned.len() {
         let fits = |at: usize, id: DeviceId| differs(id, &identities[at]).is_none();
         pairs = by_wiring::without_doubtful(context, pairs, &planned, fits);
     }
-    let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     for (at, found) in identities.iter().enumerate() {
         let is_known =
             paired.contains(&at) || by_alias::is_one(context, seen[at].place, found).await;
