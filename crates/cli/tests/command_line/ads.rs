@@ -2,7 +2,7 @@
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use linesman_proto::ads::{AMS_TCP_HEADER_LEN, AdsRequest, AmsAddress, AmsHeader, AmsNetId, index};
 use serde_json::Value;
@@ -172,7 +172,14 @@ fn what_is_seen_online_is_read_and_written_by_ads() {
     // A state: to SAFEOP and back.
     for state in [4_u8, 8] {
         assert_eq!(client.write(MAIN, index::DEVICE_STATES, STEPPER.into(), &[state, 0]), 0);
-        assert_eq!(client.words(index::DEVICE_STATES, STEPPER.into()), [u16::from(state)]);
+        // States are those of the latest look at the network, which may have been before the change.
+        let until = Instant::now() + Duration::from_secs(5);
+        let mut shown = client.words(index::DEVICE_STATES, STEPPER.into());
+        while shown != [u16::from(state)] && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(20));
+            shown = client.words(index::DEVICE_STATES, STEPPER.into());
+        }
+        assert_eq!(shown, [u16::from(state)]);
     }
     let (result, data) = client.result(MAIN, &AdsRequest::DeviceInfo);
     assert_eq!((result, &data[4..12]), (0, &b"Linesman"[..]));
