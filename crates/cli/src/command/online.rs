@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use linesman_maindevice::service::Service;
 use linesman_proto::address::DeviceId;
+use linesman_proto::state::NetworkState;
 use linesman_proto::time::Span;
 use linesman_runtime::online::report::{OnlineReport, SCHEMA};
 use linesman_runtime::selector::Selector;
@@ -29,6 +30,9 @@ use crate::output::Output;
 
 /// Most bytes of a saved report.
 const MOST: u64 = 256 * 1024 * 1024;
+/// Looks at a network until it shows that it was reset, and the time between them.
+const LOOKS_AFTER_RESET: u32 = 100;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(10);
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -237,6 +241,14 @@ fn reset(path: &Path, output: &Output) -> Result<(), Failure> {
     let answer = service::reset(path).map_err(|error| silent(path, &error))?;
     if let Some(why) = answer.error {
         output.warn(&format!("nothing was reset: {why}"));
+        return Ok(());
+    }
+    // What is shown is the latest look at the network, which may have been before the reset.
+    for _ in 0..LOOKS_AFTER_RESET {
+        if ask(path)?.state.word & NetworkState::LOCKED == 0 {
+            break;
+        }
+        std::thread::sleep(BETWEEN_LOOKS);
     }
     Ok(())
 }
