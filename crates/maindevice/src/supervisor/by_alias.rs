@@ -10,7 +10,7 @@ use linesman_proto::address::{RegisterAddress, StationAddress, StationAlias};
 use linesman_proto::register::{STATION_ADDRESS, STATION_ALIAS};
 use linesman_proto::sii::Identity;
 
-use super::{Context, Reachability, find, lose};
+use super::{Context, find, lose};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::lock;
@@ -31,9 +31,7 @@ pub(super) fn alias_of(device: &DevicePlan) -> Option<StationAlias> {
 pub(super) async fn locate(context: &Context) {
     let wire = &context.wire;
     let wanted: Vec<(&DevicePlan, StationAlias)> = (context.plan.devices.iter())
-        .filter(|device| {
-            !matches!(lock(&context.device_table).found(device.id), Reachability::There { .. })
-        })
+        .filter(|device| !lock(&context.device_table).is_there(device.id))
         .filter_map(|device| Some((device, alias_of(device)?)))
         .collect();
     if wanted.is_empty() {

@@ -13,8 +13,8 @@ use linesman_proto::port::{Port, PortMap};
 use linesman_proto::register::{DL_STATUS, DlStatus};
 use linesman_proto::topology::{End, Reconstruction, SeenController, Tree};
 
+use super::Context;
 use super::locate::FoundController;
-use super::{Context, Reachability};
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
 
@@ -61,8 +61,7 @@ pub(super) async fn note(context: &Context, seen: &mut [FoundController]) {
         .collect();
     for (at, id) in placed {
         let is_fixed = |device: &DevicePlan| context.plan.group_of(device.id).is_none();
-        let is_missing =
-            !matches!(lock(&context.device_table).found(id), Reachability::There { .. });
+        let is_missing = !lock(&context.device_table).is_there(id);
         if is_missing && context.plan.device(id).is_some_and(is_fixed) {
             seen[at].wired = Some(id);
         }
@@ -116,22 +115,20 @@ fn place(
     }
 }
 
-/// Pairs of found and planned ones, left out those that may as well be others: of several equal ones that are missing it is only one
-/// whose neighbour on the line is back.
+/// Pairs of found and planned ones, left out those that may as well be others: of several equal ones of `planned`, which are missing, it
+/// is only one whose neighbour in the planned tree is back.
 pub(super) fn without_doubtful(
-    context: &Context,
+    tree: &Tree,
+    is_there: impl Fn(DeviceId) -> bool,
     pairs: Vec<(usize, DeviceId)>,
     planned: &[DeviceId],
     fits: impl Fn(usize, DeviceId) -> bool,
 ) -> Vec<(usize, DeviceId)> {
-    let tree = &context.plan.tree;
     let taken: BTreeSet<DeviceId> = pairs.iter().map(|(_, id)| *id).collect();
     let may_be_another =
         |at: usize| planned.iter().any(|other| !taken.contains(other) && fits(at, *other));
     let (mut doubtful, mut sure): (Vec<_>, Vec<_>) =
         pairs.into_iter().partition(|(at, _)| may_be_another(*at));
-    let is_there =
-        |id: DeviceId| matches!(lock(&context.device_table).found(id), Reachability::There { .. });
     loop {
         let back: BTreeSet<DeviceId> = sure.iter().map(|(_, id)| *id).collect();
         let is_beside_one = |id: DeviceId| {
@@ -165,6 +162,25 @@ mod tests {
     fn line(open: &[&[Port]]) -> Tree {
         let seen: Vec<_> = open.iter().map(|ports| SeenController::open_at(ports)).collect();
         derive(&seen).expect("it is a line")
+    }
+
+    #[test]
+    fn of_equal_ones_that_are_missing_one_is_taken_if_its_neighbour_is_back() {
+        use Port::{A, B};
+        // A line of five; the last three are missing, and equal.
+        let planned = line(&[&[A, B], &[A, B], &[A, B], &[A, B], &[A]]);
+        let id = DeviceId;
+        let missing = [id(2), id(3), id(4)];
+        let left = |pairs: &[(usize, DeviceId)], equal: &[DeviceId]| {
+            let fits = |_: usize, other: DeviceId| equal.contains(&other);
+            let is_there = |id: DeviceId| id.0 < 2;
+            without_doubtful(&planned, is_there, pairs.to_vec(), &missing, fits)
+        };
+        assert_eq!(left(&[(0, id(2))], &missing), [(0, id(2))], "the one before it is there");
+        assert_eq!(left(&[(0, id(4))], &missing), [], "it may be any of the three");
+        let both = [(0, id(2)), (1, id(3))];
+        assert_eq!(left(&both, &missing), both, "each is beside one that is back");
+        assert_eq!(left(&[(0, id(4))], &[id(4)]), [(0, id(4))], "no other one is like it");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use linesman_proto::register::{self, DlControl, LoopMode};
 use linesman_proto::time::Span;
 
 use super::times::Phase;
-use super::{Context, DeviceTable, Reachability};
+use super::{Context, DeviceTable};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::{Wire, lock};
@@ -201,9 +201,7 @@ async fn set(context: &Context, one: Option<DeviceId>) -> Result<StationAddress,
     };
     let setting: Vec<_> = (context.plan.devices.iter())
         .filter(|device| one.is_none_or(|one| one == device.id))
-        .filter(|device| {
-            matches!(lock(&context.device_table).found(device.id), Reachability::There { .. })
-        })
+        .filter(|device| lock(&context.device_table).is_there(device.id))
         .filter_map(|device| {
             let station = device.station;
             let clock = clocks.iter().find(|clock| clock.has_clock && clock.station == station)?;

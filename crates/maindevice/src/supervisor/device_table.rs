@@ -184,6 +184,11 @@ impl DeviceTable {
         self.devices.get(id.index()).map_or(Reachability::Unknown, |live| live.found)
     }
 
+    /// True if a SubDevice is where it can be reached.
+    pub(crate) fn is_there(&self, id: DeviceId) -> bool {
+        matches!(self.found(id), Reachability::There { .. })
+    }
+
     /// Whether every SubDevice is where it can be reached.
     pub(crate) fn are_all_there(&self) -> bool {
         self.devices.iter().all(|live| matches!(live.found, Reachability::There { .. }))

@@ -19,10 +19,10 @@ use linesman_proto::register::STATION_ADDRESS;
 use linesman_proto::sii::Identity;
 use linesman_proto::topology::{End, Tree};
 
+use super::Context;
 use super::by_wiring::trees;
 use super::group_table::{GroupPlace, NotTaken};
 use super::locate::{Equals, FoundController, identify, stretch};
-use super::{Context, Reachability};
 use crate::event::Event;
 use crate::exchange::Target;
 use crate::executor::lock;
@@ -124,7 +124,7 @@ impl GroupSearch<'_> {
         let is_it = |device: &&DevicePlan| device.station == station;
         let device = self.context.plan.devices.iter().find(is_it).filter(|_| is_alone)?;
         let device_table = lock(&self.context.device_table);
-        let is_there = matches!(device_table.found(device.id), Reachability::There { .. });
+        let is_there = device_table.is_there(device.id);
         (is_there && device_table.groups.group_of(device.id).is_some()).then_some(device.id)
     }
 
@@ -227,8 +227,7 @@ impl GroupSearch<'_> {
 
     fn is_there(&self, group: usize) -> bool {
         let first = self.context.plan.groups.get(group).map(HotConnectGroup::first);
-        let found = |id| lock(&self.context.device_table).found(id);
-        first.is_some_and(|id| matches!(found(id), Reachability::There { .. }))
+        first.is_some_and(|id| lock(&self.context.device_table).is_there(id))
     }
 
     /// Whether it may be one of those that are in no group, and are not there.
@@ -236,7 +235,7 @@ impl GroupSearch<'_> {
         let device_table = lock(&self.context.device_table);
         self.context.plan.devices.iter().any(|device| {
             device_table.groups.group_of(device.id).is_none()
-                && !matches!(device_table.found(device.id), Reachability::There { .. })
+                && !device_table.is_there(device.id)
                 && mismatch(&device.identity, found, device.revision_rule).is_none()
         })
     }

@@ -166,9 +166,7 @@ async fn by_place(context: &Context, seen: &mut Vec<FoundController>) {
     let (placed, ids): (Vec<FoundController>, Vec<DeviceId>) =
         seen.iter().filter_map(|one| Some((*one, fits(one)?))).unzip();
     stretch(context, &placed, ids, Equals::Beside).await;
-    let is_there = |id: &DeviceId| {
-        matches!(lock(&context.device_table).found(*id), Reachability::There { .. })
-    };
+    let is_there = |id: &DeviceId| lock(&context.device_table).is_there(*id);
     seen.retain(|one| fits(one).is_none_or(|id| is_there(&id)));
     for one in seen {
         one.known = one.known.or(fits(one));
@@ -243,7 +241,7 @@ pub(super) async fn stretch(
 ) {
     let planned: Vec<DeviceId> = (planned.into_iter())
         .filter(|id| by_alias::alias_of(&context.plan.devices[id.index()]).is_none())
-        .filter(|id| !matches!(lock(&context.device_table).found(*id), Reachability::There { .. }))
+        .filter(|id| !lock(&context.device_table).is_there(*id))
         .collect();
     if seen.is_empty() {
         return;
@@ -275,7 +273,9 @@ pub(super) async fn stretch(
     let paired: BTreeSet<usize> = pairs.iter().map(|(at, _)| *at).collect();
     if equals == Equals::Beside && seen.len() != planned.len() {
         let fits = |at: usize, id: DeviceId| differs(id, &identities[at]).is_none();
-        pairs = by_wiring::without_doubtful(context, pairs, &planned, fits);
+        let is_there = |id| lock(&context.device_table).is_there(id);
+        let tree = &context.plan.tree;
+        pairs = by_wiring::without_doubtful(tree, is_there, pairs, &planned, fits);
     }
     for (at, found) in identities.iter().enumerate() {
         let is_known =

@@ -244,8 +244,7 @@ fn is_by_place(device: &DevicePlan) -> bool {
 /// station address may be another one.
 fn is_by_number(context: &Context, device: &DevicePlan) -> bool {
     let first = context.plan.group_of(device.id).map(HotConnectGroup::first);
-    let found = |id| lock(&context.device_table).found(id);
-    first.is_some_and(|first| !matches!(found(first), Reachability::There { .. }))
+    first.is_some_and(|first| !lock(&context.device_table).is_there(first))
 }
 
 /// A SubDevice does not answer.

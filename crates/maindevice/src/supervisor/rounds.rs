@@ -9,7 +9,7 @@ use linesman_config::plan::DevicePlan;
 use linesman_proto::register::{self, ErrorCounters};
 use linesman_proto::state::AlState;
 
-use super::{Context, Reachability};
+use super::Context;
 use crate::event::Event;
 use crate::exchange::{Reply, Target};
 use crate::executor::lock;
@@ -55,9 +55,7 @@ fn is_as_wanted(reply: &Reply, wanted: &[AlState]) -> bool {
 
 /// Reads error counters of all that are there, and tells those that have changed.
 async fn counters(context: &Context, len: u16, known: &mut [Option<ErrorCounters>]) {
-    let is_there = |device: &&DevicePlan| {
-        matches!(lock(&context.device_table).found(device.id), Reachability::There { .. })
-    };
+    let is_there = |device: &&DevicePlan| lock(&context.device_table).is_there(device.id);
     let there = context.plan.devices.iter().filter(is_there);
     let read = |device: &DevicePlan| {
         let target = Target::Station(device.station);

@@ -57,17 +57,7 @@ fn ask(
     let (number, data) = request.to_bytes();
     let command = AdsCommand::from_number(number).unwrap();
     let request = MailboxRequest::Ads { net_id, port, source: None, command, data };
-    let id = bench.id("B1");
-    bench.events.clear();
-    bench.device.serve(bench.now, id, Service::Mailbox(request));
-    assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::Served { .. })));
-    match bench.events.pop() {
-        Some((_, Event::Served { result, .. })) => (*result).map(|answer| {
-            let ServiceAnswer::Data(data) = answer else { panic!("{answer:?}") };
-            data
-        }),
-        other => panic!("{other:?}"),
-    }
+    bench.ask_mailbox("B1", request)
 }
 
 fn code(outcome: Result<Vec<u8>, ServiceFailure>) -> u32 {

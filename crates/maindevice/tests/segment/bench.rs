@@ -2,6 +2,8 @@
 
 use linesman_config::inventory::Inventory;
 use linesman_config::plan::{Plan, PlanOptions};
+use linesman_maindevice::mailbox::MailboxRequest;
+use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure};
 use linesman_maindevice::{Event, MainDevice, Options};
 use linesman_proto::address::{DeviceId, Network, Path};
 use linesman_proto::state::AlState;
@@ -58,6 +60,25 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
+    /// Has a request to the mailbox of a SubDevice done, and gives the data of the answer.
+    pub(crate) fn ask_mailbox(
+        &mut self,
+        name: &str,
+        request: MailboxRequest,
+    ) -> Result<Vec<u8>, ServiceFailure> {
+        let id = self.id(name);
+        self.events.clear();
+        self.device.serve(self.now, id, Service::Mailbox(request));
+        assert!(self.run_until(Span::s(5), |event| matches!(event, Event::Served { .. })));
+        match self.events.pop() {
+            Some((_, Event::Served { result, .. })) => (*result).map(|answer| {
+                let ServiceAnswer::Data(data) = answer else { panic!("{answer:?}") };
+                data
+            }),
+            other => panic!("{other:?}"),
+        }
+    }
+
     pub(crate) fn new(toml: &str) -> Self {
         Self::with_options(toml, Options::default())
     }

@@ -1,9 +1,8 @@
 //! SoE with a virtual drive: IDNs read and written in fragments, refusals, procedure commands.
 
 use crate::bench::{Bench, Fate};
-use linesman_maindevice::Event;
 use linesman_maindevice::mailbox::MailboxRequest;
-use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer, ServiceFailure};
+use linesman_maindevice::service::{RefusalKind, ServiceFailure};
 use linesman_proto::mailbox::soe::{
     ALL_COMMANDS, ALL_NUMBERS, ATTRIBUTE, CommandProgress, CommandState, DATA_STATE, Idn, MAXIMUM,
     NAME, SoeAttribute, UNIT, VALUE, VariableData, numbers_of_list,
@@ -19,17 +18,7 @@ const BRAKE_DELAY: Idn = Idn(0x8000 | 150);
 const NOTES: Idn = Idn(0x8000 | 151);
 
 fn ask(bench: &mut Bench, request: MailboxRequest) -> Result<Vec<u8>, ServiceFailure> {
-    let id = bench.id("X1");
-    bench.events.clear();
-    bench.device.serve(bench.now, id, Service::Mailbox(request));
-    assert!(bench.run_until(Span::s(5), |event| matches!(event, Event::Served { .. })));
-    match bench.events.pop() {
-        Some((_, Event::Served { result, .. })) => (*result).map(|answer| {
-            let ServiceAnswer::Data(data) = answer else { panic!("{answer:?}") };
-            data
-        }),
-        other => panic!("{other:?}"),
-    }
+    bench.ask_mailbox("X1", request)
 }
 
 fn read(bench: &mut Bench, idn: Idn, elements: u8) -> Result<Vec<u8>, ServiceFailure> {
