@@ -126,13 +126,10 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let (command, data) = asked(&arguments.action)?;
     let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
-    let outcome = match session.open_mailbox(id, output) {
-        Ok(opened) => {
-            let outcome = ask(&mut session, id, arguments, command, data, output);
-            session.close(opened, outcome, output)
-        }
-        Err(trouble) => Err(trouble),
-    };
+    let opened = session.open_mailbox(id, output);
+    let outcome = session.with_opened(opened, output, |session, output| {
+        ask(session, id, arguments, command, data, output)
+    });
     end(outcome, arguments.json, output)
 }
 

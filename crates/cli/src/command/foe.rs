@@ -94,13 +94,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         true => session.open_boot(id, output),
         false => session.open_mailbox(id, output),
     };
-    let outcome = match opened {
-        Ok(opened) => {
-            let outcome = act(&mut session, id, transfer, data, arguments.json, output);
-            session.close(opened, outcome, output)
-        }
-        Err(trouble) => Err(trouble),
-    };
+    let outcome = session.with_opened(opened, output, |session, output| {
+        act(session, id, transfer, data, arguments.json, output)
+    });
     end(outcome, arguments.json, output)
 }
 

@@ -129,13 +129,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     }
     let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
-    let outcome = match session.open_mailbox(id, output) {
-        Ok(opened) => {
-            let outcome = act(&mut session, id, arguments, output);
-            session.close(opened, outcome, output)
-        }
-        Err(trouble) => Err(trouble),
-    };
+    let opened = session.open_mailbox(id, output);
+    let outcome =
+        session.with_opened(opened, output, |session, output| act(session, id, arguments, output));
     match outcome {
         Ok(status) => Ok(status),
         Err(trouble) => end(Err(trouble), arguments.json, output),

@@ -65,13 +65,9 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
     let texts = esi.map_or_else(Vec::new, |esi| texts(&esi, &session, id, output));
-    let outcome = match session.open_mailbox(id, output) {
-        Ok(opened) => {
-            let outcome = read(&mut session, id, &texts, arguments);
-            session.close(opened, outcome, output)
-        }
-        Err(trouble) => Err(trouble),
-    };
+    let opened = session.open_mailbox(id, output);
+    let outcome =
+        session.with_opened(opened, output, |session, _| read(session, id, &texts, arguments));
     let outcome = match outcome {
         Ok(report) => {
             if let Some(path) = &arguments.export {

@@ -159,13 +159,9 @@ fn transition(letters: &str) -> Result<String, String> {
 pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let mut session = ServiceLine::open(&arguments.place.line)?;
     let id = session.device(&arguments.place.device)?;
-    let outcome = match session.open_mailbox(id, output) {
-        Ok(opened) => {
-            let outcome = act(&mut session, id, arguments, output);
-            session.close(opened, outcome, output)
-        }
-        Err(trouble) => Err(trouble),
-    };
+    let opened = session.open_mailbox(id, output);
+    let outcome =
+        session.with_opened(opened, output, |session, output| act(session, id, arguments, output));
     end(outcome, arguments.json, output)
 }
 

@@ -88,8 +88,20 @@ impl ServiceLine {
         Ok(OpenedMailbox { id, back_to: Some(back_to) })
     }
 
+    /// Does something with a SubDevice whose mailbox was opened for it, and takes it back to where it was.
+    pub(crate) fn with_opened<T>(
+        &mut self,
+        opened: Result<OpenedMailbox, ServiceError>,
+        output: &mut Output,
+        act: impl FnOnce(&mut Self, &mut Output) -> Result<T, ServiceError>,
+    ) -> Result<T, ServiceError> {
+        let opened = opened?;
+        let outcome = act(self, output);
+        self.close(opened, outcome, output)
+    }
+
     /// Takes a SubDevice back to where it was, whatever has become of the command.
-    pub(crate) fn close<T>(
+    fn close<T>(
         &mut self,
         opened: OpenedMailbox,
         outcome: Result<T, ServiceError>,
