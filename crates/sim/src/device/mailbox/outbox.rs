@@ -42,13 +42,18 @@ struct QueuedMessage {
 pub(super) struct Outbox {
     waiting: VecDeque<QueuedMessage>,
     sent: Counter,
-    /// The last message in SyncManager 1, in case it is lost.
+    /// The last message that was put into SyncManager 1.
     last: Vec<u8>,
+    /// The one before it, which the MainDevice has fetched. Empty if there is none.
+    fetched: Vec<u8>,
+    /// A message that was taken out of SyncManager 1 for one that is repeated, and goes in after it.
+    taken_out: Option<Vec<u8>>,
 }
 
 impl Outbox {
+    /// Messages that are not in SyncManager 1 yet.
     pub(super) fn len(&self) -> usize {
-        self.waiting.len()
+        self.waiting.len() + usize::from(self.taken_out.is_some())
     }
 
     /// The next message has this counter, 1 to 7.
@@ -67,6 +72,14 @@ impl Outbox {
     /// Puts the next message into SyncManager 1, if that is empty. One that does not fit into it is
     /// not sent.
     pub(super) fn deliver(&mut self, pdi: &mut Pdi<'_>) {
+        if let Some(message) = self.taken_out.take() {
+            if pdi.write_sync_manager(ANSWERS, &message) {
+                self.fetched = std::mem::replace(&mut self.last, message);
+            } else {
+                self.taken_out = Some(message);
+            }
+            return;
+        }
         while let Some(waiting) = self.waiting.front() {
             let counter = self.sent.next();
             let header = Header {
@@ -85,16 +98,25 @@ impl Outbox {
             if pdi.write_sync_manager(ANSWERS, &message) {
                 self.waiting.pop_front();
                 self.sent = counter;
-                self.last = message;
+                self.fetched = std::mem::replace(&mut self.last, message);
             }
             return;
         }
     }
 
-    /// Puts the last message in again: the MainDevice did not get it.
-    pub(super) fn repeat(&self, pdi: &mut Pdi<'_>) {
-        if !pdi.mailbox_full(ANSWERS) && !self.last.is_empty() {
-            pdi.write_sync_manager(ANSWERS, &self.last);
+    /// Puts the message in again that was fetched last: the MainDevice did not get it. Where the next
+    /// one is in the mailbox already, it is taken out, and follows.
+    pub(super) fn repeat(&mut self, pdi: &mut Pdi<'_>) {
+        if !pdi.mailbox_full(ANSWERS) {
+            if !self.last.is_empty() {
+                pdi.write_sync_manager(ANSWERS, &self.last);
+            }
+        } else if !self.fetched.is_empty() {
+            pdi.deactivate_sync_manager(ANSWERS, true);
+            pdi.deactivate_sync_manager(ANSWERS, false);
+            let repeated = std::mem::take(&mut self.fetched);
+            pdi.write_sync_manager(ANSWERS, &repeated);
+            self.taken_out = Some(std::mem::replace(&mut self.last, repeated));
         }
     }
 }

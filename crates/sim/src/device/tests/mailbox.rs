@@ -59,6 +59,39 @@ fn a_lost_answer_is_repeated() {
 }
 
 #[test]
+fn lost_answer_is_repeated_before_the_next_message_that_waits_already() {
+    let mut device = Device::of("EL3104");
+    device.enter_preop();
+    let report = |device: &mut Device, code| {
+        let emergency = Emergency { code, register: ErrorRegister(1), data: [0; 5] };
+        let now = device.bench.now;
+        device.bench.controller.report(now, emergency);
+        device.bench.wait(Span::ms(10));
+    };
+    let code = |message: Option<Vec<u8>>| message.map(|m| u16::from_le_bytes([m[8], m[9]]));
+    for emergency in [1, 2, 3] {
+        report(&mut device, emergency);
+    }
+    // Nothing has been fetched, so there is nothing to repeat: the first stays where it is.
+    device.bench.write(0x080E, &[0x03]);
+    device.bench.wait(Span::ms(1));
+    assert_eq!(device.bench.byte(0x080F) & 0x02, 0x02);
+    assert_eq!(code(device.fetch()), Some(1));
+    device.bench.wait(Span::ms(1));
+    assert_eq!(device.bench.byte(0x080D) & 0x08, 0x08, "the second one is in the mailbox");
+    // The MainDevice did not get the first. It asks twice, which changes nothing.
+    for request in [0x01, 0x03] {
+        device.bench.write(0x080E, &[request]);
+        device.bench.wait(Span::ms(1));
+        assert_eq!(device.bench.byte(0x080F) & 0x02, request & 0x02);
+    }
+    for expected in [1, 2, 3] {
+        assert_eq!(code(device.fetch_soon()), Some(expected));
+    }
+    assert!(device.fetch_soon().is_none());
+}
+
+#[test]
 fn what_is_no_message_is_answered_with_an_error() {
     // message, code of the error reply
     let table: [(&[u8], u16); 9] = [
