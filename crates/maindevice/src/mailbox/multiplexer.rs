@@ -49,10 +49,17 @@ pub(crate) struct Multiplexer {
     protocols: Protocols,
     /// Counter of the last message that was sent; `None` before the first.
     sent: Option<Counter>,
+    /// Counter of the last message that was fetched; `NONE` before the first, and if it does not count.
     received: Counter,
+    /// The SubDevice has begun anew, and nobody has fetched a message since.
+    first_is_due: bool,
     /// A message was asked for again: what comes may be one that we have had.
     fetched_again: bool,
-    /// A message is missing: its frame was lost, and the next one was in the mailbox already.
+    /// A frame that fetched was lost, and the SubDevice has not been asked yet to put its message in again.
+    repetition_due: bool,
+    /// The SubDevice did so when it was asked last, or has not been asked yet.
+    repeats_on_request: bool,
+    /// A message is missing: its frame was lost, and the SubDevice did not put it in again.
     missing: bool,
     /// An operation was given up whose answer may still come.
     late: bool,
@@ -86,7 +93,10 @@ impl Multiplexer {
             protocols: mailbox.protocols,
             sent: None,
             received: Counter::NONE,
+            first_is_due: false,
             fetched_again: false,
+            repetition_due: false,
+            repeats_on_request: true,
             missing: false,
             late: false,
             rubbish: None,
@@ -103,8 +113,9 @@ impl Multiplexer {
 
     /// The SubDevice begins anew, and so does counting.
     pub(crate) fn reset(&mut self) {
-        (self.sent, self.received) = (None, Counter::NONE);
+        (self.sent, self.received, self.first_is_due) = (None, Counter::NONE, true);
         (self.fetched_again, self.missing, self.late) = (false, false, false);
+        (self.repetition_due, self.repeats_on_request) = (false, true);
         self.passed = PassedTransfer::default();
         self.fragments = UnansweredFragments::default();
     }
@@ -333,6 +344,9 @@ impl Multiplexer {
 
     /// The message in the mailbox, if there is a new one.
     async fn fetch(&mut self) -> Result<Option<Vec<u8>>, ExchangeError> {
+        if self.repetition_due {
+            self.fetch_again().await?;
+        }
         // What the cycle has seen need not be asked for.
         if !self.queues.take_full(self.id) && !self.is_full(IN).await? {
             return Ok(None);
@@ -352,27 +366,39 @@ impl Multiplexer {
                         return Ok(None);
                     }
                     self.missing |= uncertain && counter.skips(self.received);
-                    self.received = counter;
+                    (self.received, self.first_is_due) = (counter, false);
                     return Ok(Some(reply.data.into_vec()));
                 }
                 Ok(_) => return Ok(None),
                 Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error),
-                // The frame got lost on its way there or back. If the message is gone from the
-                // mailbox, the SubDevice is asked to put it in again.
+                // The frame got lost on its way there or back.
                 Err(ExchangeError::NoReply { .. }) => {
                     uncertain = true;
-                    if !self.is_full(IN).await? {
-                        self.repetitions = self.repetitions.wrapping_add(1);
-                        self.fetched_again = true;
-                        self.ask_for_repetition().await?;
-                    }
+                    self.repetition_due = true;
+                    self.fetch_again().await?;
                 }
             }
         }
         Ok(None)
     }
 
-    async fn ask_for_repetition(&self) -> Result<(), ExchangeError> {
+    /// Makes sure that a message is not missed whose frame was lost. What is in the mailbox now is the
+    /// same one or the next one, which only counters tell apart: a SubDevice that counts puts the one
+    /// before in again in either case, and takes out the next one for it. One that somebody else has
+    /// fetched is not asked for.
+    async fn fetch_again(&mut self) -> Result<(), ExchangeError> {
+        let known = self.received != Counter::NONE || self.first_is_due;
+        if known && self.repeats_on_request || !self.is_full(IN).await? {
+            self.repetitions = self.repetitions.wrapping_add(1);
+            self.fetched_again = true;
+            self.repeats_on_request = self.ask_for_repetition().await?;
+        }
+        self.repetition_due = false;
+        Ok(())
+    }
+
+    /// Whether the SubDevice has put the last message in again, as far as it says.
+    async fn ask_for_repetition(&self) -> Result<bool, ExchangeError> {
         let at = byte_of(IN, ACTIVATE_AT);
         let reply = self.wire.read_one(self.target, at, 1).await?;
         let activate = SmActivate(reply.bytes::<1>(0)[0]);
@@ -384,11 +410,11 @@ impl Multiplexer {
             let reply = self.wire.read_one(self.target, byte_of(IN, PDI_CONTROL_AT), 1).await?;
             let acknowledged = SmPdiControl(reply.bytes::<1>(0)[0]).repeat_acknowledge();
             if acknowledged == asked {
-                return Ok(());
+                return Ok(true);
             }
             self.wire.sleep(FIRST_POLL).await;
         }
-        Ok(())
+        Ok(false)
     }
 
     /// Hands a message on by its type. What may be an answer of the protocol that is `wanted` is

@@ -1,6 +1,6 @@
 //! SubDevices whose software fails while their controllers work: what a MainDevice meets.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, Fate};
 use crate::mailbox::{PLANT, get, put, upload};
 use linesman_config::fault::FaultName;
 use linesman_maindevice::Event;
@@ -9,6 +9,7 @@ use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::mailbox::coe::ObjectAddress;
 use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
+use linesman_sim::seed::Seed;
 use linesman_sim::segment_file::FaultEntry;
 use linesman_sim::truth::{Effect, Entry, FaultId};
 
@@ -173,6 +174,28 @@ fn emergencies_come_with_code_register_and_data_and_are_taken_back() {
         })
         .collect();
     assert_eq!(codes, [0x4310, 0x4310, 0x4310, 0], "the log has each");
+}
+
+#[test]
+fn each_emergency_comes_once_while_frames_get_lost() {
+    // One that is lost on its way back has left the mailbox, and the next one may be in it.
+    for seed in 1..20 {
+        let mut bench = running();
+        let mut chance = Seed(seed).stream("lost frames");
+        bench.tamper =
+            Some(Box::new(move |_| if chance.chance(0.1) { Fate::Lost } else { Fate::Arrives }));
+        let entry = FaultEntry::new(FaultName::Emergency).device("A1").with("every_ms", 20.0);
+        let fault = inject(&mut bench, &entry);
+        bench.run_for(Span::s(2));
+        heal(&mut bench, fault);
+        bench.tamper = None;
+        bench.run_for(Span::s(1));
+        let told =
+            bench.events.iter().filter(|(_, e)| matches!(e, Event::Emergency { .. })).count();
+        let sent = effects(&bench, fault).len();
+        assert!(sent > 100, "{sent}");
+        assert_eq!(told, sent, "losses of seed {seed}");
+    }
 }
 
 #[test]
