@@ -21,8 +21,10 @@ use serde::de::DeserializeOwned;
 use crate::part::guard;
 use crate::watched_file::WatchedFile;
 
-/// Longest request in bytes.
-const MOST: u64 = 64 * 1024;
+/// Longest request in bytes that may come on every connection at once.
+pub(crate) const MOST: u64 = 64 * 1024;
+/// Longer ones at a time.
+const LONG_ONES: usize = 4;
 /// Bytes that are read and thrown away behind a request that is too long.
 const DISCARD_MAX: u64 = 16 * 1024 * 1024;
 /// How long the other side may take to read an answer.
@@ -37,7 +39,9 @@ const CLIENTS: usize = 32;
 /// What is asked and answered.
 pub(crate) trait Protocol: Send + Sync + 'static {
     /// What can be asked.
-    type Request: DeserializeOwned + Clone + Send;
+    type Request: DeserializeOwned + Clone;
+    /// A request as the thread that runs the line takes it: read to its end.
+    type Order: Send;
     /// What the thread that runs the line gives.
     type Reply: Send;
     /// What is answered.
@@ -48,6 +52,11 @@ pub(crate) trait Protocol: Send + Sync + 'static {
     const EXAMPLE: &'static str;
     /// How long an answer may take.
     const PATIENCE: Duration;
+    /// Longest request in bytes.
+    const LONGEST: u64;
+
+    /// What a request asks for. Threads that talk to those who ask find that out, too.
+    fn order(request: Self::Request) -> Self::Order;
 
     /// What is answered when this was given. Threads that talk to those who ask do that, so that the
     /// one that runs the line need not put anything into words.
@@ -107,14 +116,17 @@ impl ControlSocketWatch {
 
 /// A request, and who waits for its answer.
 pub(crate) struct Asked<P: Protocol> {
-    pub(crate) request: P::Request,
-    reply: Sender<P::Reply>,
+    pub(crate) order: P::Order,
+    pub(crate) asker: Asker<P>,
 }
 
-impl<P: Protocol> Asked<P> {
+/// Who waits for an answer.
+pub(crate) struct Asker<P: Protocol>(Sender<P::Reply>);
+
+impl<P: Protocol> Asker<P> {
     pub(crate) fn give(self, reply: P::Reply) {
         // Whoever asked may have lost patience.
-        let _ = self.reply.send(reply);
+        let _ = self.0.send(reply);
     }
 }
 
@@ -138,7 +150,8 @@ impl<P: Protocol> RequestSender<P> {
     /// Sends a request; `None` when too many wait, or nobody does them any more.
     pub(crate) fn send(&self, request: P::Request) -> Option<SentRequest<P>> {
         let (reply, answer) = mpsc::channel();
-        let asked = self.requests.try_send(Asked { request, reply });
+        let asked = Asked { order: P::order(request), asker: Asker(reply) };
+        let asked = self.requests.try_send(asked);
         self.wake_handle.wake();
         asked.ok().map(|()| SentRequest(answer))
     }
@@ -152,10 +165,22 @@ impl<P: Protocol> RequestSender<P> {
 /// A request whose answer is waited for.
 pub(crate) struct SentRequest<P: Protocol>(Receiver<P::Reply>);
 
+/// What follows a request on its connection.
+enum After {
+    /// The next one.
+    Next,
+    /// Nothing: the protocol keeps the connection.
+    Kept,
+    /// Nothing: the request was refused, and is not read to its end.
+    Unread,
+}
+
 /// Shared parts of the threads of connections.
 struct Connection<P: Protocol> {
     sender: RequestSender<P>,
     clients: AtomicUsize,
+    /// Those of them whose request is a long one.
+    long: AtomicUsize,
 }
 
 impl<P: Protocol> ControlSocket<P> {
@@ -171,7 +196,11 @@ impl<P: Protocol> ControlSocket<P> {
         let listener = UnixListener::bind(path)?;
         hand_over(path);
         let (sender, receiver) = request_queue(wake_handle, protocol);
-        let connection = Arc::new(Connection { sender, clients: AtomicUsize::default() });
+        let connection = Arc::new(Connection {
+            sender,
+            clients: AtomicUsize::default(),
+            long: AtomicUsize::default(),
+        });
         let failed = Arc::default();
         let (socket, closed) = (WatchedFile::at(path), Arc::default());
         let watch = ControlSocketWatch { socket, failed: Arc::clone(&failed), closed };
@@ -273,35 +302,78 @@ impl<P: Protocol> Connection<P> {
             if len == 0 {
                 return Ok(());
             }
-            if len as u64 > MOST {
-                self.refuse(stream, format!("the request is longer than {MOST} bytes"))?;
-                // Whoever still writes would be cut off, and not read why.
-                stream.set_read_timeout(Some(PATIENCE))?;
-                return io::copy(&mut lines.take(DISCARD_MAX), &mut io::sink()).map(drop);
-            }
-            if line.iter().all(u8::is_ascii_whitespace) {
-                continue;
-            }
-            match serde_json::from_slice::<P::Request>(&line) {
-                Ok(request) => {
-                    let answer = self.relay(request.clone());
-                    if self.sender.protocol.keep(&request, &answer, stream)? {
-                        return Ok(());
-                    }
-                    reply(stream, &answer)?;
+            let after = match len as u64 <= MOST {
+                true => self.answer(stream, &line)?,
+                false => {
+                    let others = self.long.fetch_add(1, Ordering::Relaxed);
+                    let answered = self.answer_long(stream, &mut lines, line, others);
+                    self.long.fetch_sub(1, Ordering::Relaxed);
+                    answered?
                 }
-                Err(error) => {
-                    let example = P::EXAMPLE;
-                    self.refuse(
-                        stream,
-                        format!(
-                            "the request cannot be read: {error}; expected one line of JSON such \
-                             as {example}"
-                        ),
-                    )?;
+            };
+            match after {
+                After::Next => {}
+                After::Kept => return Ok(()),
+                After::Unread => {
+                    // Whoever still writes would be cut off, and not read why.
+                    stream.set_read_timeout(Some(PATIENCE))?;
+                    return io::copy(&mut lines.take(DISCARD_MAX), &mut io::sink()).map(drop);
                 }
             }
         }
+    }
+
+    /// Reads the rest of a long request, while `others` are under way, and answers it.
+    fn answer_long(
+        &self,
+        stream: &UnixStream,
+        lines: &mut BufReader<&UnixStream>,
+        mut line: Vec<u8>,
+        others: usize,
+    ) -> io::Result<After> {
+        if P::LONGEST > MOST {
+            if others >= LONG_ONES {
+                self.refuse(stream, format!("{LONG_ONES} long requests are under way: ask again"))?;
+                return Ok(After::Unread);
+            }
+            // Whoever has begun may not keep others waiting.
+            stream.set_read_timeout(Some(PATIENCE))?;
+            let rest = P::LONGEST + 1 - line.len() as u64;
+            lines.take(rest).read_until(b'\n', &mut line)?;
+            stream.set_read_timeout(None)?;
+        }
+        if line.len() as u64 > P::LONGEST {
+            self.refuse(stream, format!("the request is longer than {} bytes", P::LONGEST))?;
+            return Ok(After::Unread);
+        }
+        self.answer(stream, &line)
+    }
+
+    /// Does what a line asks for.
+    fn answer(&self, stream: &UnixStream, line: &[u8]) -> io::Result<After> {
+        if line.iter().all(u8::is_ascii_whitespace) {
+            return Ok(After::Next);
+        }
+        match serde_json::from_slice::<P::Request>(line) {
+            Ok(request) => {
+                let answer = self.relay(request.clone());
+                if self.sender.protocol.keep(&request, &answer, stream)? {
+                    return Ok(After::Kept);
+                }
+                reply(stream, &answer)?;
+            }
+            Err(error) => {
+                let example = P::EXAMPLE;
+                self.refuse(
+                    stream,
+                    format!(
+                        "the request cannot be read: {error}; expected one line of JSON such as \
+                         {example}"
+                    ),
+                )?;
+            }
+        }
+        Ok(After::Next)
     }
 
     /// Asks the thread that runs the line.

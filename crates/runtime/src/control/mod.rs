@@ -18,7 +18,7 @@ use serde::de::DeserializeOwned;
 pub(crate) use self::apply::apply;
 use self::message::{Answer, Faults, Request};
 pub use crate::control_socket::ControlSocketWatch;
-use crate::control_socket::{Asked, ControlSocket, Protocol, ask_line, ask_lines};
+use crate::control_socket::{self, Asked, ControlSocket, Protocol, ask_line, ask_lines};
 use crate::truth_writer::TruthReader;
 
 /// The socket of a segment that runs. It is removed at the end.
@@ -29,11 +29,17 @@ pub(crate) struct SegmentProtocol(TruthReader);
 
 impl Protocol for SegmentProtocol {
     type Request = Request;
+    type Order = Request;
     type Reply = Answer;
     type Answer = Answer;
     const WHO: &'static str = "segment";
     const EXAMPLE: &'static str = "{\"do\":\"list\"}";
     const PATIENCE: Duration = Duration::from_secs(2);
+    const LONGEST: u64 = control_socket::MOST;
+
+    fn order(request: Request) -> Request {
+        request
+    }
 
     fn answer(&self, reply: Answer) -> Answer {
         reply

@@ -211,6 +211,9 @@ impl<A: Application> SessionHooks for RunSession<A> {
             self.run.application_mut().served(*ticket, result);
             return;
         }
+        if let (Some(socket), Event::FileProgress { id, progress }) = (&mut self.socket, &event) {
+            socket.file_moved(*id, progress.clone());
+        }
         self.run.event(now, event, main);
     }
 

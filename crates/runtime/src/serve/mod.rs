@@ -157,9 +157,9 @@ impl Server {
             {
                 nap = SOON;
                 while let Some(asked) = control.poll() {
-                    let answer = apply(now, &asked.request, self);
+                    let answer = apply(now, &asked.order, self);
                     self.tell(&mut beside.truth_writer);
-                    asked.give(answer);
+                    asked.asker.give(answer);
                 }
             }
             self.wiring.carry(self.segment.signals_mut());

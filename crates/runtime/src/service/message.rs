@@ -1,6 +1,6 @@
 //! Requests to a running MainDevice and its answers: lines of JSON.
 
-use linesman_maindevice::mailbox::MailboxRequest;
+use linesman_maindevice::mailbox::{FileProgress, MailboxRequest};
 use linesman_maindevice::service::{RefusalKind, Service, ServiceAnswer};
 use linesman_proto::address::RegisterAddress;
 use linesman_proto::ads::{AdsCommand, AmsAddress, AmsNetId};
@@ -41,6 +41,8 @@ pub enum Request {
         #[serde(default)]
         frames: bool,
     },
+    /// Files that are under way between SubDevices and whoever asked here.
+    Files,
     /// Reset the network: outputs that are locked after a link error are sent again.
     Reset,
     /// A service for one SubDevice, beside the cycle.
@@ -162,6 +164,35 @@ pub struct Answer {
     pub online: Option<Box<OnlineReport>>,
     /// The sum of the errors of each SubDevice, by number; `null` unless that was asked.
     pub errors: Option<Vec<u64>>,
+    /// Files that are under way; `null` unless that was asked.
+    pub files: Option<Vec<FileUnderWay>>,
+}
+
+/// A file that is under way.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct FileUnderWay {
+    /// Number of the SubDevice in the plan, from 1.
+    pub no: u32,
+    /// Bytes of the file that are through.
+    pub done: u64,
+    /// Bytes of the whole file; `null` while nobody knows, as in reading.
+    pub total: Option<u64>,
+    /// The same in words, with what keeps the SubDevice busy: "0 of 5000 bytes, the SubDevice is busy: erasing,
+    /// 25 %".
+    pub text: String,
+}
+
+impl FileUnderWay {
+    pub(crate) fn of(no: u32, progress: &FileProgress) -> Self {
+        Self {
+            no,
+            done: progress.done as u64,
+            total: progress.total.map(|total| total as u64),
+            text: progress.to_string(),
+        }
+    }
 }
 
 /// By what code a SubDevice has said no.
@@ -199,6 +230,11 @@ impl Answer {
     /// The sum of the errors of each SubDevice.
     pub(crate) fn errors(sums: Vec<u64>) -> Self {
         Self { errors: Some(sums), ..Self::empty() }
+    }
+
+    /// Files that are under way.
+    pub(crate) fn files(files: Vec<FileUnderWay>) -> Self {
+        Self { files: Some(files), ..Self::empty() }
     }
 
     /// It is done, and there is nothing to tell.

@@ -14,14 +14,15 @@ use std::path::Path;
 use std::time::Duration;
 
 use linesman_link::socket::WakeHandle;
+use linesman_maindevice::mailbox::{FileProgress, MailboxRequest};
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::{MainDevice, Statistics};
 use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
-use self::message::{Answer, Asked as AskedService, Request};
+use self::message::{Answer, Asked as AskedService, FileUnderWay, Request};
 pub use crate::control_socket::ControlSocketWatch;
-use crate::control_socket::{Asked, ControlSocket, Protocol, ask_line};
+use crate::control_socket::{self, Asked, Asker, ControlSocket, Protocol, ask_line};
 use crate::online::{OnlineState, Rates, Snapshot};
 use crate::run::report::RunReport;
 
@@ -33,9 +34,33 @@ pub(crate) struct ServiceProtocol {
     pub(crate) online: OnlineState,
 }
 
+/// Longest file that is brought through the socket, in bytes: more than any SubDevice holds.
+pub const LONGEST_FILE: u64 = 64 << 20;
+
+/// What the thread that runs the line does for somebody.
+pub(crate) enum ServiceOrder {
+    Status,
+    Online,
+    Errors,
+    Clear {
+        errors: bool,
+        frames: bool,
+    },
+    Files,
+    Reset,
+    Serve {
+        /// Number of the SubDevice in the plan, from 1.
+        no: u32,
+        /// What is to be done, or why that cannot be read.
+        service: Result<Service, String>,
+    },
+}
+
 /// What the thread that runs the line gives.
 pub(crate) enum ServiceReply {
     Answer(Box<Answer>),
+    /// What a service gave.
+    Served(Box<Result<ServiceAnswer, ServiceFailure>>),
     /// The line as it is now.
     Snapshot(Box<Snapshot>),
     /// Errors are asked for, which are known without it.
@@ -50,15 +75,33 @@ pub(crate) enum ServiceReply {
 
 impl Protocol for ServiceProtocol {
     type Request = Request;
+    type Order = ServiceOrder;
     type Reply = ServiceReply;
     type Answer = Answer;
     const WHO: &'static str = "MainDevice";
     const EXAMPLE: &'static str = "{\"do\":\"status\"}";
     const PATIENCE: Duration = PATIENCE;
+    // Two digits for each byte of a file, and what stands around it.
+    const LONGEST: u64 = 2 * LONGEST_FILE + control_socket::MOST;
+
+    fn order(request: Request) -> ServiceOrder {
+        match request {
+            Request::Status => ServiceOrder::Status,
+            Request::Online => ServiceOrder::Online,
+            Request::Errors => ServiceOrder::Errors,
+            Request::Clear { errors, frames } => ServiceOrder::Clear { errors, frames },
+            Request::Files => ServiceOrder::Files,
+            Request::Reset => ServiceOrder::Reset,
+            Request::Serve { no, service } => {
+                ServiceOrder::Serve { no, service: service.service() }
+            }
+        }
+    }
 
     fn answer(&self, reply: ServiceReply) -> Answer {
         match reply {
             ServiceReply::Answer(answer) => *answer,
+            ServiceReply::Served(result) => Answer::of(&result),
             ServiceReply::Snapshot(snapshot) => {
                 self.online.report(&snapshot).map_or_else(too_early, Answer::online)
             }
@@ -134,13 +177,27 @@ impl ServiceSocket {
     ) {
         self.services.served(ticket, result);
     }
+
+    /// The file of a SubDevice has come so far.
+    pub(crate) fn file_moved(&mut self, id: DeviceId, progress: FileProgress) {
+        self.services.file_moved(id, progress);
+    }
 }
 
 /// Services that are being done by the thread that runs the line, and who waits for them.
 #[derive(Default)]
 pub(crate) struct PendingServices {
-    pending: Vec<(ServiceTicket, Asked<ServiceProtocol>)>,
+    pending: Vec<PendingService>,
     rates: Rates,
+}
+
+struct PendingService {
+    ticket: ServiceTicket,
+    id: DeviceId,
+    asker: Asker<ServiceProtocol>,
+    moves_file: bool,
+    /// How far its file has come, if it moves one.
+    file: Option<FileProgress>,
 }
 
 impl PendingServices {
@@ -157,30 +214,38 @@ impl PendingServices {
         main: &mut MainDevice,
         report: impl Fn(&MainDevice) -> RunReport,
     ) {
-        match asked.request.clone() {
-            Request::Status => asked.answer(Answer::status(report(main))),
-            Request::Online => {
+        let Asked { order, asker } = asked;
+        match order {
+            ServiceOrder::Status => asker.answer(Answer::status(report(main))),
+            ServiceOrder::Online => {
                 let snapshot = Snapshot::of(main, now, &self.rates);
-                asked.give(ServiceReply::Snapshot(Box::new(snapshot)));
+                asker.give(ServiceReply::Snapshot(Box::new(snapshot)));
             }
-            Request::Errors => asked.give(ServiceReply::Errors),
-            Request::Clear { errors, frames } => {
+            ServiceOrder::Errors => asker.give(ServiceReply::Errors),
+            ServiceOrder::Files => asker.answer(Answer::files(self.files())),
+            ServiceOrder::Clear { errors, frames } => {
                 if errors {
                     main.clear_counts();
                 }
                 let frames = frames.then(|| main.statistics());
-                asked.give(ServiceReply::Clear { errors, frames });
+                asker.give(ServiceReply::Clear { errors, frames });
             }
-            Request::Reset => asked.answer(match main.reset() {
+            ServiceOrder::Reset => asker.answer(match main.reset() {
                 true => Answer::done(),
                 false => Answer::refusal(NOT_UP.to_owned()),
             }),
-            Request::Serve { no, service } => match prepared(main, no, service) {
+            ServiceOrder::Serve { no, service } => match prepared(main, no, service) {
                 Ok((id, service)) => {
+                    let moves_file = matches!(
+                        service,
+                        Service::Mailbox(
+                            MailboxRequest::ReadFile { .. } | MailboxRequest::WriteFile { .. }
+                        )
+                    );
                     let ticket = main.serve(now, id, service);
-                    self.pending.push((ticket, asked));
+                    self.pending.push(PendingService { ticket, id, asker, moves_file, file: None });
                 }
-                Err(why) => asked.answer(Answer::refusal(why)),
+                Err(why) => asker.answer(Answer::refusal(why)),
             },
         }
     }
@@ -191,14 +256,29 @@ impl PendingServices {
         ticket: ServiceTicket,
         result: &Result<ServiceAnswer, ServiceFailure>,
     ) {
-        if let Some(at) = self.pending.iter().position(|(pending, _)| *pending == ticket) {
-            let (_, asked) = self.pending.swap_remove(at);
-            asked.answer(Answer::of(result));
+        if let Some(at) = self.pending.iter().position(|pending| pending.ticket == ticket) {
+            let result = ServiceReply::Served(Box::new(result.clone()));
+            self.pending.swap_remove(at).asker.give(result);
         }
+    }
+
+    /// The file of a SubDevice has come so far. A SubDevice moves one after the other.
+    fn file_moved(&mut self, id: DeviceId, progress: FileProgress) {
+        let mut of_it = self.pending.iter_mut().filter(|pending| pending.id == id);
+        if let Some(pending) = of_it.find(|pending| pending.moves_file) {
+            pending.file = Some(progress);
+        }
+    }
+
+    fn files(&self) -> Vec<FileUnderWay> {
+        let under_way = |pending: &PendingService| {
+            pending.file.as_ref().map(|file| FileUnderWay::of(pending.id.no(), file))
+        };
+        self.pending.iter().filter_map(under_way).collect()
     }
 }
 
-impl Asked<ServiceProtocol> {
+impl Asker<ServiceProtocol> {
     fn answer(self, answer: Answer) {
         self.give(ServiceReply::Answer(Box::new(answer)));
     }
@@ -208,13 +288,13 @@ impl Asked<ServiceProtocol> {
 fn prepared(
     main: &MainDevice,
     no: u32,
-    service: AskedService,
+    service: Result<Service, String>,
 ) -> Result<(DeviceId, Service), String> {
     let plan = main.plan().ok_or(NOT_UP)?;
     let count = plan.devices.len();
     let device = plan.devices.iter().find(|device| device.id.no() == no);
     let device = device.ok_or_else(|| format!("there is no SubDevice {no}, there are {count}"))?;
-    Ok((device.id, service.service()?))
+    Ok((device.id, service?))
 }
 
 /// Asks the MainDevice whose socket is at `path` for a service.
@@ -240,6 +320,14 @@ pub fn status(path: &Path) -> io::Result<Answer> {
 /// As [`ask`].
 pub fn online(path: &Path) -> io::Result<Answer> {
     request(path, &Request::Online)
+}
+
+/// Asks which files are under way, asked for here.
+///
+/// # Errors
+/// As [`ask`].
+pub fn files(path: &Path) -> io::Result<Answer> {
+    request(path, &Request::Files)
 }
 
 /// Lets counts begin at 0 again: those of errors and changes, those of frames, or both. No register is
