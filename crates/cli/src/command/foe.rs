@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::Service;
 use linesman_proto::address::DeviceId;
+use linesman_runtime::service::LONGEST_FILE;
 use serde::Serialize;
 
 use super::sdo::value::number;
@@ -15,9 +16,6 @@ use crate::files;
 use crate::output::Output;
 use crate::text::quantity::count;
 use crate::version;
-
-/// Longest file that is sent, in bytes: more than any SubDevice holds.
-const LONGEST: u64 = 64 << 20;
 
 /// What can be asked.
 #[derive(clap::Args, Debug)]
@@ -84,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
             None
         }
         Action::Write(transfer) => {
-            Some(files::bytes(&transfer.file, "the file to be sent", LONGEST)?)
+            Some(files::bytes(&transfer.file, "the file to be sent", LONGEST_FILE)?)
         }
     };
     let mut session = ServiceLine::open(&arguments.place.line)?;

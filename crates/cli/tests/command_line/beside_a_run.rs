@@ -1,9 +1,14 @@
 //! Services for single SubDevices beside a running MainDevice, through its control socket.
 
+use std::collections::BTreeSet;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+
 use crate::support::running::{PLANT, Running};
 use crate::support::{assert_valid, linesman};
 use linesman_sim::device::files::FirmwareImage;
-use serde_json::Value;
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 // proves: DIA-08 partial: requests beside a run
@@ -178,7 +183,7 @@ fn firmware_is_taken_in_boot_and_files_go_both_ways() {
     // Firmware: it is taken in BOOT only, and the SubDevice is brought back to where it was.
     let version = || done(&["sdo", &socket, "4", "read", "0x100A", "--type", "STRING"]).stdout;
     let before = version();
-    let image = FirmwareImage::build("EL6601", "47", &[0x5A; 20_000]);
+    let image = FirmwareImage::build("EL6601", "47", &[0x5A; 200_000]);
     std::fs::write(path("new.efw"), &image).unwrap();
     let refused = linesman(["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--json"]);
     assert_eq!(
@@ -187,13 +192,68 @@ fn firmware_is_taken_in_boot_and_files_go_both_ways() {
         "{}",
         refused.all()
     );
-    let wrote =
-        done(&["foe", &socket, "4", "write", "new.efw", &path("new.efw"), "--boot", "--json"]);
+    // Meanwhile the run tells how far it has come.
+    let mut told = BTreeSet::new();
+    let firmware = path("new.efw");
+    let command = ["foe", &socket, "4", "write", "new.efw", &firmware, "--boot", "--json"];
+    let wrote = std::thread::scope(|scope| {
+        let writer = scope.spawn(|| linesman(command));
+        while !writer.is_finished() {
+            let files = running.ask(r#"{"do":"files"}"#)["files"].clone();
+            for file in files.as_array().unwrap() {
+                assert_eq!(
+                    (&file["no"], &file["total"]),
+                    (&json!(4), &json!(image.len())),
+                    "{file}"
+                );
+                told.insert(file["text"].as_str().unwrap().to_owned());
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        writer.join().unwrap()
+    });
+    assert_eq!(wrote.status, 0, "{}", wrote.all());
     assert_eq!(wrote.json()["size"], image.len(), "{}", wrote.all());
+    let whole = format!(" of {} bytes", image.len());
+    assert!(told.iter().any(|text| text.contains(&whole)), "{told:?}");
+    let files = running.ask(r#"{"do":"files"}"#);
+    assert_eq!(files["files"], json!([]), "none is under way");
     running.until("is back in OP", |report| report["devices"][3]["al_state"] == "OP");
     assert!(!before.contains("47") && version().contains("47"), "{before} then {}", version());
     let others = linesman(["state", &socket, "--json"]).json();
     assert!(others["devices"].as_array().unwrap().iter().all(|one| one["al_state"] == "OP"));
+}
+
+#[test]
+fn long_requests_are_read_a_few_at_a_time() {
+    let running = Running::start(PLANT);
+    let send = |bytes: &[u8]| {
+        let mut stream = UnixStream::connect(running.socket()).unwrap();
+        stream.write_all(bytes).unwrap();
+        stream
+    };
+    let error = |stream: UnixStream| {
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let mut line = String::new();
+        BufReader::new(stream).read_line(&mut line).unwrap();
+        let answer: Value = serde_json::from_str(&line).unwrap();
+        answer["error"].as_str().unwrap().to_owned()
+    };
+    let mut long = vec![b'x'; 200_000];
+    long.push(b'\n');
+    let told = error(send(&long));
+    assert!(told.contains("cannot be read"), "{told}");
+    // Whoever begins and does not go on keeps no place for ever.
+    let stalled: Vec<UnixStream> = (0..4).map(|_| send(&long[..100_000])).collect();
+    let refused = (0..100).any(|_| error(send(&long)).contains("4 long requests are under way"));
+    assert!(refused, "a fifth was read");
+    for mut stream in stalled {
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        let ended = stream.read_to_end(&mut Vec::new());
+        assert!(ended.is_ok(), "the connection of one that stalls is closed: {ended:?}");
+    }
+    let told = error(send(&long));
+    assert!(told.contains("cannot be read"), "{told}");
 }
 
 /// A stepper stage, and what it notes of itself: severity and number of the text, and when.

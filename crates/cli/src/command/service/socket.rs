@@ -1,19 +1,28 @@
 //! Service client of a line that a MainDevice drives: services go through its control socket,
 //! beside the cycle.
 
+use std::io::{self, IsTerminal as _};
 use std::os::unix::fs::FileTypeExt as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use linesman_diagnosis::Diagnosis;
+use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::sii::Identity;
 use linesman_proto::time::Span;
 use linesman_runtime::service;
+use linesman_runtime::service::message::Answer;
 
 use super::known::KnownDevice;
 use super::{ServiceClient, ServiceRefused};
 use crate::failure::Failure;
+use crate::output::Progress;
+
+/// Between two looks at a file that is under way.
+const LOOK_EVERY: Duration = Duration::from_millis(200);
 
 /// A running MainDevice.
 pub(super) struct SocketClient {
@@ -72,8 +81,11 @@ impl ServiceClient for SocketClient {
         id: DeviceId,
         service: Service,
     ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
-        let answer = service::ask(&self.path, id.no(), &service)
-            .map_err(|error| silent(&self.path, &error))?;
+        let asked = match moves_a_file(&service) && io::stderr().is_terminal() {
+            true => ask_showing_progress(&self.path, id, &service),
+            false => service::ask(&self.path, id.no(), &service),
+        };
+        let answer = asked.map_err(|error| silent(&self.path, &error))?;
         Ok(answer
             .given()
             .map_err(|(why, refusal)| ServiceRefused { told: Failure::from_text(&why), refusal }))
@@ -93,6 +105,36 @@ impl ServiceClient for SocketClient {
         // The run tells them itself.
         Vec::new()
     }
+}
+
+fn moves_a_file(service: &Service) -> bool {
+    matches!(
+        service,
+        Service::Mailbox(MailboxRequest::ReadFile { .. } | MailboxRequest::WriteFile { .. })
+    )
+}
+
+/// Asks for a file to be moved, and meanwhile how far it has come.
+fn ask_showing_progress(path: &Path, id: DeviceId, service: &Service) -> io::Result<Answer> {
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            let mut progress = Progress::new();
+            while !done.load(Ordering::Acquire) {
+                std::thread::park_timeout(LOOK_EVERY);
+                // Who does not tell how far it has come moves the file all the same.
+                let Ok(answer) = service::files(path) else { continue };
+                let files = answer.files.unwrap_or_default();
+                if let Some(file) = files.into_iter().find(|file| file.no == id.no()) {
+                    progress.show(|| file.text);
+                }
+            }
+        });
+        let answer = service::ask(path, id.no(), service);
+        done.store(true, Ordering::Release);
+        watcher.thread().unpark();
+        answer
+    })
 }
 
 pub(crate) fn silent(path: &Path, error: &std::io::Error) -> Failure {

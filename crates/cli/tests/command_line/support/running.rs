@@ -102,12 +102,17 @@ impl Running {
     /// How it goes, as its socket tells.
     #[track_caller]
     pub(crate) fn status(&self) -> Value {
+        self.ask(r#"{"do":"status"}"#)["run"].clone()
+    }
+
+    /// What its socket answers to a line of JSON.
+    #[track_caller]
+    pub(crate) fn ask(&self, request: &str) -> Value {
         let mut stream = UnixStream::connect(self.socket()).unwrap();
-        stream.write_all(b"{\"do\":\"status\"}\n").unwrap();
+        stream.write_all(format!("{request}\n").as_bytes()).unwrap();
         let mut line = String::new();
         BufReader::new(stream).read_line(&mut line).unwrap();
-        let answer: Value = serde_json::from_str(&line).unwrap();
-        answer["run"].clone()
+        serde_json::from_str(&line).unwrap()
     }
 
     /// What `linesman online` reports of it, once that is as expected; on a busy computer that takes a while.
