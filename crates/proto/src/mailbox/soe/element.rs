@@ -156,6 +156,12 @@ impl CommandState {
 }
 
 impl CommandProgress {
+    /// Whether its execution has ended, well or not.
+    #[must_use]
+    pub const fn has_ended(self) -> bool {
+        matches!(self, Self::Done | Self::Failed)
+    }
+
     /// In words.
     #[must_use]
     pub const fn text(self) -> &'static str {
