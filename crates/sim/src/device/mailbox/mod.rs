@@ -166,14 +166,14 @@ impl Mailbox {
                 self.request = Some((request, due));
             }
         }
-        self.tell(served.state);
+        self.tell(served.state, now);
         let frames = self.frames(now, pdi, served);
         if fills {
             self.outbox.deliver(pdi);
         }
         let due = self.request.as_ref().map(|(_, due)| *due);
         let again = (self.outbox.len() > 0 && fills).then(|| now + LOOK_AGAIN);
-        [due, again, frames].into_iter().flatten().min()
+        [due, again, frames, self.soe.next_end()].into_iter().flatten().min()
     }
 
     /// Puts fragments of Ethernet frames among the messages that wait, and says when to look again. Room for an answer is
@@ -205,14 +205,21 @@ impl Mailbox {
         }
     }
 
-    /// Puts emergencies among the messages that wait, while there is room. In BOOT there is no CoE.
-    fn tell(&mut self, state: AlState) {
+    /// Puts emergencies and notifications among the messages that wait, while there is room. In BOOT there is
+    /// neither CoE nor SoE.
+    fn tell(&mut self, state: AlState, now: Instant) {
         while state != AlState::Boot
             && self.outbox.len() < WAITING
             && let Some(emergency) = self.emergencies.pop_front()
         {
             let body = coe::write(&CoeMessage::Emergency(emergency));
             self.outbox.push(MailboxType::Coe, Envelope::UNASKED, body);
+        }
+        while state != AlState::Boot
+            && self.outbox.len() < WAITING
+            && let Some(body) = self.soe.poll_notification(now)
+        {
+            self.outbox.push(MailboxType::Soe, Envelope::UNASKED, body);
         }
     }
 

@@ -72,6 +72,8 @@ struct SetCommand {
     since: Instant,
     /// It cannot be executed.
     failed: bool,
+    /// The MainDevice was notified of its end.
+    notified: bool,
 }
 
 impl SoeServer {
@@ -111,6 +113,37 @@ impl SoeServer {
             Ok(data) if data.is_empty() => vec![write(&begin)],
             Ok(data) => fragments(&begin, &data, room),
         }
+    }
+
+    /// The next notification that a procedure command has ended.
+    pub(super) fn poll_notification(&mut self, now: Instant) -> Option<Vec<u8>> {
+        let ended = self.commands.iter_mut().filter(|command| !command.notified);
+        let (command, progress) = ended
+            .map(|command| {
+                let progress = command.progress(command.takes(), now);
+                (command, progress)
+            })
+            .find(|(_, progress)| progress.has_ended())?;
+        command.notified = true;
+        let state = CommandState::of(progress).0.to_le_bytes();
+        Some(write(&Message {
+            operation: Operation::Notification,
+            incomplete: false,
+            error: false,
+            drive: 0,
+            elements: DATA_STATE,
+            number: command.idn.0,
+            data: &state,
+        }))
+    }
+
+    /// When a procedure command ends next.
+    pub(super) fn next_end(&self) -> Option<Instant> {
+        let running = self
+            .commands
+            .iter()
+            .filter(|command| !command.notified && command.word == CommandState::SET_AND_ENABLE);
+        running.map(|command| command.since + command.takes()).min()
     }
 
     /// Data of the elements that are asked for, in the order of their bits.
@@ -227,12 +260,20 @@ impl SoeServer {
         }
         let failed = idn == CALIBRATE && !is_enabled(served);
         self.commands.retain(|command| command.idn != idn);
-        self.commands.push(SetCommand { idn, word, since: now, failed });
+        self.commands.push(SetCommand { idn, word, since: now, failed, notified: false });
         Ok(())
     }
 }
 
 impl SetCommand {
+    /// How long it takes.
+    fn takes(&self) -> Span {
+        match DriveParameter::find(self.idn).map(|parameter| &parameter.source) {
+            Some(ValueSource::Command(takes)) => *takes,
+            _ => Span::ZERO,
+        }
+    }
+
     fn progress(&self, takes: Span, now: Instant) -> CommandProgress {
         match self.word {
             CommandState::SET_AND_ENABLE if self.failed => CommandProgress::Failed,
