@@ -352,6 +352,7 @@ pub(super) fn concerned(event: &Event) -> Option<DeviceId> {
         | Event::Links { id, .. }
         | Event::PortOpened { id, .. }
         | Event::Emergency { id, .. }
+        | Event::Mailbox { id, .. }
         | Event::SdoUploaded { id, .. }
         | Event::SdoDownloaded { id, .. } => Some(*id),
         _ => None,

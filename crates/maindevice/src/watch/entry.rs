@@ -68,7 +68,7 @@ pub enum EntryKind {
     Ring,
     /// A SubDevice sent an emergency message.
     Emergency,
-    /// An access to its mailbox failed.
+    /// An access to its mailbox failed, or its drive has told something through it.
     Mailbox,
     /// The host: carrier, application.
     Host,

@@ -2,6 +2,7 @@ use linesman_config::identity::Mismatch;
 use linesman_config::plan::{
     DevicePlan, HotConnectGroup, IdentificationCheck, IdentificationSource,
 };
+use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::coe::{Emergency, ErrorRegister};
 use linesman_proto::port::Port;
 use linesman_proto::register::{AlStatus, DlStatus, ErrorCounter, ErrorCounters, PortState};
@@ -487,6 +488,43 @@ fn an_emergency_is_told_with_its_class() {
     watch.handle_event(at(0), &Event::Emergency { id: DeviceId(4), emergency });
     let lines = texts(&mut watch);
     assert!(lines[0].starts_with("'Term 68 (EL7041)' (1019): emergency 0x8611 ("), "{lines:?}");
+}
+
+#[test]
+fn notifications_and_emergencies_of_a_drive_are_told() {
+    // Header: operation and drive in the first byte, elements, IDN; then the data.
+    for (data, severity, expected) in [
+        (
+            &[0x05, 0x01, 99, 0, 0x03, 0][..],
+            Severity::Info,
+            "drive 0 notifies: procedure command S-0-0099: done",
+        ),
+        (
+            &[0x25, 0x01, 99, 0, 0x0F, 0],
+            Severity::Warning,
+            "drive 1 notifies: procedure command S-0-0099: error",
+        ),
+        (
+            &[0x05, 0x40, 51, 0, 1, 0xAB],
+            Severity::Info,
+            "drive 0 notifies: value of S-0-0051: 01 AB",
+        ),
+        (&[0x06, 0, 0, 0, 7], Severity::Error, "emergency of drive 0: 07"),
+    ] {
+        let mut watch = watch();
+        let (id, kind, data) = (DeviceId(4), MailboxType::Soe, data.to_vec());
+        watch.handle_event(at(0), &Event::Mailbox { id, kind, data });
+        let entry = watch.poll_entry().unwrap();
+        assert_eq!(entry.severity, severity, "{entry:?}");
+        assert!(entry.text.ends_with(expected), "{entry:?}");
+    }
+    // Neither an answer that nobody waits for nor what is no message is worth a line.
+    for data in [&[0x02, 0x40, 51, 0, 1][..], &[5, 0]] {
+        let mut watch = watch();
+        let (id, kind, data) = (DeviceId(4), MailboxType::Soe, data.to_vec());
+        watch.handle_event(at(0), &Event::Mailbox { id, kind, data });
+        assert!(texts(&mut watch).is_empty());
+    }
 }
 
 #[test]

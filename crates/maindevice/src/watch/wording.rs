@@ -6,6 +6,10 @@
 use linesman_config::inventory::label;
 use linesman_config::plan::Plan;
 use linesman_proto::address::{DeviceId, Path};
+use linesman_proto::mailbox::MailboxType;
+use linesman_proto::mailbox::soe::{
+    CommandProgress, CommandState, DATA_STATE, Idn, Message, Operation, elements_in_words,
+};
 use linesman_proto::port::Port;
 use linesman_proto::register::{DlStatus, ErrorCounters};
 use linesman_proto::time::{Instant, Span};
@@ -121,6 +125,9 @@ pub(super) fn of(
                 emergency.register.0
             );
             vec![words.about(*id, Severity::Error, EntryKind::Emergency, text)]
+        }
+        Event::Mailbox { id, kind: MailboxType::Soe, data } => {
+            Message::parse(data).map_or_else(Vec::new, |message| words.drive(*id, &message))
         }
         Event::SdoUploaded { id, result: Err(error), .. }
         | Event::SdoDownloaded { id, result: Err(error), .. } => {
@@ -240,6 +247,48 @@ impl EntryWords<'_> {
         let text =
             format!(": its clock {how}: {difference} off the reference clock, {window} allowed");
         vec![self.about(id, severity, EntryKind::Clock, text)]
+    }
+
+    /// Notifications and emergencies of a drive. Answers are told by whoever asked.
+    fn drive(&self, id: DeviceId, message: &Message<'_>) -> Vec<LogEntry> {
+        let drive = message.drive;
+        let bytes: Vec<String> = message.data.iter().map(|byte| format!("{byte:02X}")).collect();
+        let data = bytes.join(" ");
+        let (severity, kind, text) = match message.operation {
+            Operation::Emergency => {
+                let text = format!(": SoE: emergency of drive {drive}: {data}");
+                (Severity::Error, EntryKind::Emergency, text)
+            }
+            Operation::Notification => {
+                let (idn, of) = (Idn(message.number), format!(": SoE: drive {drive} notifies"));
+                let state = CommandState::parse(message.data);
+                match state.filter(|_| message.elements == DATA_STATE).map(CommandState::progress) {
+                    Some(progress) => {
+                        let severity = match progress {
+                            CommandProgress::Failed => Severity::Warning,
+                            CommandProgress::NotSet
+                            | CommandProgress::Set
+                            | CommandProgress::Running
+                            | CommandProgress::Interrupted
+                            | CommandProgress::Done => Severity::Info,
+                        };
+                        let text = format!("{of}: procedure command {idn}: {}", progress.text());
+                        (severity, EntryKind::Mailbox, text)
+                    }
+                    None => {
+                        let elements = elements_in_words(message.elements);
+                        let text = format!("{of}: {elements} of {idn}: {data}");
+                        (Severity::Info, EntryKind::Mailbox, text)
+                    }
+                }
+            }
+            Operation::ReadRequest
+            | Operation::ReadResponse
+            | Operation::WriteRequest
+            | Operation::WriteResponse
+            | Operation::Reserved(_) => return Vec::new(),
+        };
+        vec![self.about(id, severity, kind, text)]
     }
 
     /// Frames, working counters and outputs of a task.

@@ -1,8 +1,10 @@
 //! SoE with a virtual drive: IDNs read and written in fragments, refusals, procedure commands.
 
 use crate::bench::{Bench, Fate};
+use linesman_maindevice::Event;
 use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{RefusalKind, ServiceFailure};
+use linesman_proto::mailbox::MailboxType;
 use linesman_proto::mailbox::soe::{
     ALL_COMMANDS, ALL_NUMBERS, ATTRIBUTE, CommandProgress, CommandState, DATA_STATE, Idn, MAXIMUM,
     NAME, SoeAttribute, UNIT, VALUE, VariableData, numbers_of_list,
@@ -113,7 +115,17 @@ fn procedure_command_is_set_comes_to_its_end_and_is_taken_back() {
     write(&mut bench, reset, &[3, 0]).unwrap();
     assert_eq!(progress(&mut bench), CommandProgress::Running);
     assert_eq!(code(write(&mut bench, reset, &[3, 0])), 0x7010);
-    bench.run_until(Span::ms(50), |_| false);
+    // The drive notifies of the end, once.
+    bench.run_until(Span::ms(200), |_| false);
+    let notified: Vec<Vec<u8>> = bench
+        .events
+        .iter()
+        .filter_map(|(_, event)| {
+            let Event::Mailbox { kind: MailboxType::Soe, data, .. } = event else { return None };
+            Some(data.clone())
+        })
+        .collect();
+    assert_eq!(notified, [[0x05, DATA_STATE, 99, 0, 0x03, 0]]);
     assert_eq!(progress(&mut bench), CommandProgress::Done);
     write(&mut bench, reset, &[0, 0]).unwrap();
     assert_eq!(progress(&mut bench), CommandProgress::NotSet);
