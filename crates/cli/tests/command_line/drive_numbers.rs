@@ -133,7 +133,9 @@ fn procedure_command_is_done_or_told_with_how_far_it_came() {
 
 #[test]
 fn drive_is_asked_beside_a_run_and_keeps_what_is_written() {
-    let running = Running::start(PLANT);
+    let folder = tempfile::TempDir::new().unwrap();
+    let log = folder.path().join("log");
+    let running = Running::with_options(PLANT, &["--log", log.to_str().unwrap()]);
     let socket = running.socket();
     let soe = |rest: &[&str]| linesman([&["soe", &socket, "3"], rest].concat());
     let written = soe(&["write", "S-0-0091", "5000"]);
@@ -149,4 +151,12 @@ fn drive_is_asked_beside_a_run_and_keeps_what_is_written() {
     assert_eq!((refused.status, &refused.json()["code"]), (1, &0x7005.into()), "{}", refused.all());
     let done = soe(&["execute", "S-0-0099"]);
     assert!(done.stdout.contains("Reset class 1 diagnostic: done"), "{}", done.all());
+    // The drive notifies of that by itself.
+    let text = |log: &std::path::Path| linesman(["log", log.to_str().unwrap()]).all();
+    let notified = "drive 0 notifies: procedure command S-0-0099: done";
+    let is_told = (0..100).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        text(&log).contains(notified)
+    });
+    assert!(is_told, "{}", text(&log));
 }
