@@ -44,6 +44,9 @@ impl Knowledge {
     /// Learns what a frame shows, and adds to its row what is known of it now.
     pub fn annotate(&mut self, seen: &FrameSeen<'_>, row: &mut CaptureRow<'_>) {
         self.learn(seen);
+        if self.annotate_copy(seen, row) {
+            return;
+        }
         let Some(latest) = self.engine.latest_frame(seen.network) else { return };
         row.facts.way = match (latest.is_request(), latest.is_return()) {
             (true, _) => Some(FrameWay::Out),
@@ -64,6 +67,36 @@ impl Knowledge {
                 datagram.expected_wkc = model.expected_wkc(&datagram.datagram);
             }
         }
+    }
+
+    /// Adds what is known of a copy at a port of a capture probe; false if it is none, or its frames do not pass several
+    /// ports. The diagnosis takes a frame once it has passed all ports, so its latest frame is another one.
+    fn annotate_copy(&mut self, seen: &FrameSeen<'_>, row: &mut CaptureRow<'_>) -> bool {
+        let Some(port) = seen.probe.and_then(|record| record.port) else { return false };
+        let Some(ports) = self.engine.probe_ports(seen.network) else { return false };
+        if ports.port(port).is_none() {
+            return false;
+        }
+        row.facts.way = ports.comes_back(port).map(|comes_back| match comes_back {
+            true => FrameWay::Back,
+            false => FrameWay::Out,
+        });
+        row.facts.passed = row.facts.way.and_then(|_| ports.before(port));
+        if row.facts.way == Some(FrameWay::Out) && ports.rank(port) == 0 {
+            self.cycle.take(row);
+        }
+        row.facts.in_cycle = self.cycle.began.map(|began| row.frame.time.since(began));
+        let Some(model) = self.engine.model(seen.network) else { return true };
+        let counted = model.traffic.broadcasts.counted();
+        // Before, some SubDevices have not answered yet.
+        let is_whole = row.facts.way == Some(FrameWay::Back) && row.facts.passed == Some(counted);
+        for datagram in row.datagrams.iter_mut().filter(|_| is_whole) {
+            let expected = model.expected_wkc(&datagram.datagram);
+            // Of process data the highest counter so far is expected: the model does not know that of this frame yet.
+            let own = datagram.is_logical().then_some(datagram.wkc_sum);
+            datagram.expected_wkc = expected.map(|expected| own.unwrap_or(0).max(expected));
+        }
+        true
     }
 
     /// The capture ends at `at`; `complete` is whether all of it could be read.
@@ -133,16 +166,17 @@ impl DeviceIndex {
     /// Numbers of the SubDevices, from 1, that a datagram is for; none for a broadcast. Positions on the way back have
     /// been counted up by each controller.
     #[must_use]
-    pub fn concerned(&self, datagram: &Datagram<'_>, way: Option<FrameWay>) -> SmallVec<[u32; 4]> {
+    pub fn concerned(&self, datagram: &Datagram<'_>, row: &CaptureRow<'_>) -> SmallVec<[u32; 4]> {
         let one = |no: Option<&u32>| no.map_or_else(SmallVec::new, |no| smallvec![*no]);
         match datagram.command().map_or(Addressing::None, Command::addressing) {
             Addressing::None | Addressing::Broadcast => SmallVec::new(),
             Addressing::Station => one(self.stations.get(&datagram.adp())),
             Addressing::Position => {
-                let sent = match way {
-                    Some(FrameWay::Back) => datagram.adp().wrapping_sub(self.passed),
-                    Some(FrameWay::Out) | None => datagram.adp(),
-                };
+                let passed = row.facts.passed.unwrap_or_else(|| match row.way() {
+                    Some(FrameWay::Back) => self.passed,
+                    Some(FrameWay::Out) | None => 0,
+                });
+                let sent = datagram.adp().wrapping_sub(passed);
                 one(self.positions.get(&Position::from_auto_increment(sent).0))
             }
             Addressing::Logical => {

@@ -113,6 +113,6 @@ fn addressed(
 ) -> Option<u32> {
     let addressing = datagram.datagram.command().map(Command::addressing);
     let is_one = matches!(addressing, Some(Addressing::Position | Addressing::Station));
-    let concerned = devices.concerned(&datagram.datagram, row.way());
+    let concerned = devices.concerned(&datagram.datagram, row);
     concerned.first().copied().filter(|_| is_one)
 }

@@ -92,8 +92,8 @@ impl<'a> Look<'_, 'a> {
             }
             FieldSource::SubDevices => {
                 let Some(devices) = self.devices else { return };
-                let (all, way) = (self.datagrams(reference.datagram).iter(), self.row.way());
-                let concerned = |row: &DatagramRow<'a>| devices.concerned(&row.datagram, way);
+                let all = self.datagrams(reference.datagram).iter();
+                let concerned = |row: &DatagramRow<'a>| devices.concerned(&row.datagram, self.row);
                 all.flat_map(concerned).map(i128::from).all(receive);
             }
         }

@@ -50,6 +50,8 @@ pub struct CaptureFrame<'a> {
 pub struct FrameFacts {
     /// Whether it goes out or comes back; `None` when that is not known.
     pub way: Option<FrameWay>,
+    /// SubDevices that it has passed, where the port of a capture probe tells.
+    pub passed: Option<u16>,
     /// The time since the cycle began in which it was seen; `None` before the first cycle.
     pub in_cycle: Option<Span>,
 }

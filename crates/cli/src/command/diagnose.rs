@@ -13,7 +13,7 @@ mod recordings;
 pub(crate) mod ring;
 mod segment;
 pub(crate) mod several;
-mod tap;
+pub(crate) mod tap;
 mod target;
 
 use std::path::{Path, PathBuf};

@@ -190,3 +190,71 @@ fn link_of_a_tap_that_is_none_is_refused_with_what_is_there() {
     let named = ["diagnose", &file, "--probe", "K1.C-K2.A", "--project", project, "--json"];
     assert_eq!(linesman(named).json()["verdict"], "healthy");
 }
+
+/// Frames of a capture that meet a condition.
+fn matched(file: &str, condition: &str, probe: &[&str]) -> u64 {
+    let run = linesman([&["capture", "filter", file, condition, "--json"], probe].concat());
+    assert_eq!(run.status, 0, "{}", run.all());
+    run.json()["matched"].as_u64().unwrap()
+}
+
+// proves: WS-06 partial: the place of a probe without records
+#[test]
+fn capture_commands_read_a_tap_inside_the_line_where_its_link_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let probe = ["--probe", "1.C-3.A"];
+    for file in ["two.pcapng", "one.pcap"] {
+        let file = recorded(folder.path(), "", "K1.C", file, "tap");
+        let info = linesman([&["capture", "info", &file, "--json"], &probe[..]].concat()).json();
+        let recording = &info["recording"];
+        assert_eq!(recording["requests"], recording["returns"], "{recording}");
+        assert_eq!(recording["returns_alone"], 0, "{recording}");
+        assert_eq!(info["probe_ports"][0]["subdevices_before"], 2, "{info}");
+        let told = linesman([&["capture", "timeline", &file, "--json"], &probe[..]].concat());
+        let is_finding = |event: &&serde_json::Value| event["kind"] == "finding";
+        let told = told.json();
+        assert_eq!(told["events"].as_array().unwrap().iter().find(is_finding), None);
+        assert_eq!(matched(&file, "out", &probe), matched(&file, "back", &probe));
+        assert_eq!(matched(&file, "wkc.wrong", &probe), 0);
+        // Addresses are counted up by the two SubDevices before the tap: the second one is not asked for the third.
+        let third = matched(&file, "subdevice == 3 && ecat.cmd == \"APRD\" && out", &probe);
+        let fourth = matched(&file, "subdevice == 4 && ecat.cmd == \"APRD\" && out", &probe);
+        assert!(third > 0 && fourth > 0, "{third}, {fourth}");
+        // Without it, they are nobody's requests.
+        let unplaced = linesman(["capture", "info", &file, "--json"]).json();
+        assert_ne!(unplaced["recording"]["returns_alone"], 0);
+        let listed = linesman([&["capture", "list", &file, "-n", "1"], &probe[..]].concat());
+        assert!(listed.stdout.contains("  out  "), "{}", listed.stdout);
+    }
+}
+
+#[test]
+fn capture_commands_refuse_a_link_of_a_tap_that_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recorded(folder.path(), "", "K1.C", "tap.pcapng", "tap");
+    let record = recorded(folder.path(), "", "K1.C", "probe.pcapng", "behind");
+    let rows: [(&[&str], &str, &str); 5] = [
+        (&["info", &file], "4.B-5.A", "broadcasts had passed 2 SubDevices"),
+        (&["timeline", &file], "3.B", "`3.B` is no link"),
+        (&["filter", &file, "out"], "K1.C-K2.A", "no SubDevice is called `K1`"),
+        (&["filter", &file, "out"], "4.B-5.A", "broadcasts had passed 2 SubDevices"),
+        (&["list", &record], "1.C-3.A", "records of a capture probe"),
+    ];
+    for (command, link, expected) in rows {
+        let run = linesman([&["capture"], command, &["--probe", link]].concat());
+        assert_eq!(run.status, 2, "{command:?}: {}", run.all());
+        assert!(run.stderr.contains(expected), "{command:?}: {}", run.stderr);
+    }
+}
+
+// proves: WS-06
+#[test]
+fn copies_at_the_ports_of_a_probe_have_their_way_and_no_wrong_working_counter() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = recorded(folder.path(), "", "maindevice,K2.A", "probe.pcapng", "behind");
+    let (out, back) = (matched(&file, "out", &[]), matched(&file, "back", &[]));
+    // The first copies of all come before it is known which port is which.
+    assert!(back > 1_000 && back.abs_diff(out) <= 4, "{out} out, {back} back");
+    assert_eq!(matched(&file, "out && (esl.port == 1 || esl.port == 3)", &[]), 0);
+    assert_eq!(matched(&file, "wkc.wrong", &[]), 0);
+}

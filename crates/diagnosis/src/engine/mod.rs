@@ -17,6 +17,7 @@ use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Finding, FindingStore, Severity};
 use crate::model::{NetworkModel, search};
+use crate::observe::capture_probe::PortOrder;
 use crate::observe::{Exchange, FrameSeen, HostEvent, HostObservation, LatestFrame, Pairing};
 use crate::report::{
     self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
@@ -276,6 +277,14 @@ impl Engine {
     pub fn latest_frame(&self, network: Network) -> Option<&LatestFrame> {
         let mut all = self.networks.iter();
         all.find(|watched| watched.model.network == network).map(|watched| &watched.latest)
+    }
+
+    /// The ports of the capture probe of a network, as the copies so far tell; `None` before the first one.
+    #[must_use]
+    pub fn probe_ports(&self, network: Network) -> Option<&PortOrder> {
+        let mut all = self.networks.iter();
+        all.find(|watched| watched.model.network == network)
+            .map(|watched| watched.capture_probe.order())
     }
 
     fn watched(&mut self, network: Network) -> &mut NetworkWatch {

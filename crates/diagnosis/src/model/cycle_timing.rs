@@ -140,6 +140,12 @@ impl CycleTiming {
         self.last = None;
     }
 
+    /// Forgets the cycle and what was off it. Pauses that are over stay: who starved by one is brought back, and set up
+    /// again, right behind it.
+    pub fn learn_again(&mut self) {
+        *self = Self { pauses: std::mem::take(&mut self.pauses), ..Self::default() };
+    }
+
     fn learn(&mut self, interval: Span) {
         self.learning.push(interval.as_nanos());
         if self.learning.len() < LEARNT_FROM {
@@ -173,6 +179,17 @@ mod tests {
         assert_eq!(beat.cycle(), Some(Span::ms(1)));
         let late: Vec<u64> = beat.off.latest().iter().map(|off| off.by.as_nanos()).collect();
         assert_eq!(late, [300_000], "that before the cycle was known says nothing");
+    }
+
+    #[test]
+    fn pause_stays_known_when_the_cycle_is_learnt_again() {
+        let mut beat = ticked(std::iter::repeat_n(1_000, 40).chain([112_000]));
+        beat.learn_again();
+        assert_eq!(beat.cycle(), None);
+        assert_eq!(beat.pauses.len(), 1);
+        // The interval to the next frame says nothing.
+        assert!(!beat.tick(Instant::ZERO + Span::s(9)));
+        assert_eq!(beat.pauses.len(), 1);
     }
 
     #[test]

@@ -79,6 +79,7 @@ impl Cyclic {
     /// Notes that FMMUs of this datagram were set again: while SubDevices are brought up frames come unevenly.
     pub fn set_up_again(&mut self) {
         self.motion.forget();
-        (self.sent, self.returned) = (CycleTiming::default(), CycleTiming::default());
+        self.sent.learn_again();
+        self.returned.learn_again();
     }
 }

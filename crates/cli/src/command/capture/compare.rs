@@ -3,6 +3,7 @@
 use linesman_capture::comparison::{ChangeReport, ComparisonReport, Tendency, compare};
 
 use super::survey::{Surveyed, survey};
+use crate::command::diagnose::tap::TapArguments;
 use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -30,8 +31,9 @@ pub(crate) struct Arguments {
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
     let one = std::slice::from_ref::<String>;
-    let before = survey(one(&arguments.before), false, None, &stop, output)?;
-    let after = survey(one(&arguments.after), false, None, &stop, output)?;
+    let by_card = TapArguments::default();
+    let before = survey(one(&arguments.before), false, &by_card, None, &stop, output)?;
+    let after = survey(one(&arguments.after), false, &by_card, None, &stop, output)?;
     let diagnosis = |one: &Surveyed| one.engine.diagnosis();
     let found = compare((&before.report, &diagnosis(&before)), (&after.report, &diagnosis(&after)));
     let status = if found.changes.is_empty() { Status::Good } else { Status::Findings };

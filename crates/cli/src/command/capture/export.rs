@@ -12,6 +12,7 @@ use linesman_proto::time::Instant;
 use self::table::DatagramTable;
 use super::source::{LearnedCapture, RowSource, ShownFrame};
 use super::writer::CaptureSink;
+use crate::command::diagnose::tap::TapArguments;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::files;
@@ -41,6 +42,8 @@ pub(super) struct Arguments {
     /// What was planned (TOML or ENI): names of SubDevices, expected working counters
     #[arg(long, value_name = "PROJECT.toml|ENI.xml")]
     project: Option<PathBuf>,
+    #[command(flatten)]
+    tap: TapArguments,
 }
 
 /// Does what was asked.
@@ -48,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for path in [&arguments.csv, &arguments.parquet, &arguments.pcapng].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
-    let source = RowSource::of(&arguments.files, arguments.project.as_ref())?;
+    let source = RowSource::of(&arguments.files, arguments.project.as_ref(), &arguments.tap)?;
     let learned = source.learn(output)?;
     let mut comments = Comments::of(&learned);
     let findings = comments.count();

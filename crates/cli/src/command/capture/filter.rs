@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::source::{LearnedCapture, Passed, RowSource, ShownFrame};
 use super::writer::CaptureSink;
+use crate::command::diagnose::tap::TapArguments;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::{Output, Table};
@@ -44,6 +45,8 @@ pub(crate) struct Arguments {
     /// What was planned (TOML or ENI): names of SubDevices
     #[arg(long, value_name = "PROJECT.toml|ENI.xml")]
     project: Option<PathBuf>,
+    #[command(flatten)]
+    tap: TapArguments,
     /// List the fields that a condition can name
     #[arg(long, exclusive = true)]
     fields: bool,
@@ -106,7 +109,7 @@ fn filter(
     condition: &str,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let source = RowSource::of(&paths(words), arguments.project.as_ref())?;
+    let source = RowSource::of(&paths(words), arguments.project.as_ref(), &arguments.tap)?;
     let mut learned: Option<LearnedCapture> = None;
     let expression = source.condition(condition, &mut learned, output)?;
     let devices = learned.as_ref().map(|learned| &learned.devices);
@@ -171,7 +174,8 @@ fn filter(
 
 /// The condition that frames like one meet.
 fn like_frame(arguments: &Arguments, number: u64, output: &mut Output) -> Result<Status, Failure> {
-    let source = RowSource::of(&paths(&arguments.words), arguments.project.as_ref())?;
+    let source =
+        RowSource::of(&paths(&arguments.words), arguments.project.as_ref(), &arguments.tap)?;
     let reference = arguments.field.as_deref().map(field).transpose()?;
     let is_needed = reference.is_some_and(|reference| reference.field.needs_whole());
     let learned = if is_needed { Some(source.learn(output)?) } else { None };

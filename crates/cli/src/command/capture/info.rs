@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use linesman_capture::network::report::ProbePortReport;
 
 use super::survey::survey;
+use crate::command::diagnose::tap::TapArguments;
 use crate::command::line_access;
 use crate::exit::Status;
 use crate::failure::Failure;
@@ -21,6 +22,8 @@ pub(crate) struct Arguments {
     /// are put in the order of their times
     #[arg(long)]
     together: bool,
+    #[command(flatten)]
+    tap: TapArguments,
     /// Device descriptions of makers (ESI) that name the types of SubDevices: a folder of XML files, or one
     #[arg(long, value_name = "FOLDER|FILE.xml")]
     esi: Option<PathBuf>,
@@ -35,8 +38,8 @@ pub(crate) struct Arguments {
 /// Tells what the network is. That judges nothing: the exit status is 0 once EtherCAT frames were found.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
-    let surveyed =
-        survey(&arguments.places, arguments.together, arguments.esi.as_deref(), &stop, output)?;
+    let Arguments { places, together, tap, esi, .. } = arguments;
+    let surveyed = survey(places, *together, tap, esi.as_deref(), &stop, output)?;
     if arguments.json {
         output.json(&surveyed.report);
         return Ok(Status::Good);

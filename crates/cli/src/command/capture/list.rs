@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::source::{LearnedCapture, RowSource, ShownFrame};
 use crate::amount;
+use crate::command::diagnose::tap::TapArguments;
 use crate::exit::Status;
 use crate::failure::Failure;
 use crate::output::Output;
@@ -43,6 +44,8 @@ pub(crate) struct Arguments {
     /// What was planned (TOML or ENI): names of SubDevices
     #[arg(long, value_name = "PROJECT.toml|ENI.xml")]
     project: Option<PathBuf>,
+    #[command(flatten)]
+    tap: TapArguments,
     /// JSON, one object for each row, schema linesman.capture-row/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -75,7 +78,7 @@ pub(crate) struct RowReport {
 /// Does what was asked.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let json = arguments.json;
-    let source = RowSource::of(&arguments.files, arguments.project.as_ref())?;
+    let source = RowSource::of(&arguments.files, arguments.project.as_ref(), &arguments.tap)?;
     let mut learned: Option<LearnedCapture> = match arguments.names {
         true => Some(source.learn(output)?),
         false => None,

@@ -12,6 +12,7 @@ use linesman_runtime::capture::{Capture, CaptureItem};
 
 use crate::command::bundle::frames;
 use crate::command::diagnose::capture::skipped;
+use crate::command::diagnose::tap::{TapArguments, TapLinks};
 use crate::command::service::address::{DeviceNames, find_all};
 use crate::failure::Failure;
 use crate::files::Planned;
@@ -27,6 +28,8 @@ const FRAMES_BETWEEN_LOOKS: u64 = 32_768;
 pub(super) struct RowSource {
     files: Vec<PathBuf>,
     planned: Option<Planned>,
+    /// Links at which they were recorded inside the line.
+    tap: Option<TapLinks>,
 }
 
 /// Knowledge of the whole capture.
@@ -55,14 +58,19 @@ pub(super) struct ShownFrame<'s, 'a> {
 
 impl RowSource {
     /// The files as they were named; several are parts of one recording.
-    pub(super) fn of(files: &[PathBuf], project: Option<&PathBuf>) -> Result<Self, Failure> {
+    pub(super) fn of(
+        files: &[PathBuf],
+        project: Option<&PathBuf>,
+        tap: &TapArguments,
+    ) -> Result<Self, Failure> {
         let is_standard = |file: &PathBuf| file.as_os_str() == STANDARD_INPUT;
         if files.len() > 1 && files.iter().any(is_standard) {
             let reason = "standard input beside other files: its frames have no place among theirs";
             return Err(Failure::new(reason, "name files alone, or `-` alone"));
         }
         let planned = project.map(|path| Planned::open(path)).transpose()?;
-        Ok(Self { files: files.to_vec(), planned })
+        let tap = tap.links(planned.as_ref().map(|planned| &planned.project))?;
+        Ok(Self { files: files.to_vec(), planned, tap })
     }
 
     /// The names, for messages.
@@ -72,13 +80,17 @@ impl RowSource {
     }
 
     fn open(&self) -> Result<Capture, Failure> {
-        match self.files.as_slice() {
+        let capture = match self.files.as_slice() {
             [one] => {
                 let input = Input::open(one).map_err(linesman_link::capture::CaptureError::from)?;
-                Ok(Capture::of(frames(input)?)?)
+                Capture::of(frames(input)?)?
             }
-            several => Ok(Capture::of_files(several)?),
-        }
+            several => Capture::of_files(several)?,
+        };
+        Ok(match &self.tap {
+            Some(tap) => capture.by_tap(tap.tap()),
+            None => capture,
+        })
     }
 
     /// A diagnosis that knows what was planned.
@@ -89,7 +101,8 @@ impl RowSource {
         let source = format!("capture:{}", self.label());
         let exchange = exchange.unwrap_or_default();
         let clock = "capture".to_owned();
-        Knowledge::new(Setup { project, exchange, source, clock, ..Setup::default() })
+        let tap_places = self.tap.as_ref().map(TapLinks::before).unwrap_or_default();
+        Knowledge::new(Setup { project, exchange, source, clock, tap_places, ..Setup::default() })
     }
 
     /// Judges the whole capture: SubDevices and findings are known at its end.
@@ -119,6 +132,9 @@ impl RowSource {
         let is_read = capture.end().is_some_and(|end| end.complete());
         let complete = is_read && capture.fault().is_none();
         knowledge.finish(capture.latest(), complete);
+        if let Some(tap) = &self.tap {
+            tap.check_all(knowledge.engine(), &capture, &self.label(), output)?;
+        }
         let diagnosis = knowledge.engine().diagnosis();
         if output.is_closed() {
             return Err(Failure::new("the command was ended before", "repeat it"));
@@ -183,6 +199,10 @@ impl RowSource {
         }
         shown.clear();
         passed.complete = is_ended || self.tell_end(&capture, output);
+        if let (Some(tap), Some(mut knowledge), false) = (&self.tap, knowledge, is_ended) {
+            knowledge.finish(capture.latest(), passed.complete);
+            tap.check_all(knowledge.engine(), &capture, &self.label(), output)?;
+        }
         Ok(passed)
     }
 

@@ -16,6 +16,7 @@ use linesman_runtime::stop::Stop;
 
 use crate::command::bundle::frames;
 use crate::command::diagnose::capture::{nothing_seen, read};
+use crate::command::diagnose::tap::{TapArguments, TapLinks};
 use crate::command::diagnose::{names, ring};
 use crate::failure::Failure;
 use crate::output::Output;
@@ -33,10 +34,12 @@ pub(super) struct Surveyed {
     pub(super) names: Names,
 }
 
-/// Reads a capture; several files are one recording, `together` those of the same time. `esi` is where device descriptions are that name types.
+/// Reads a capture; several files are one recording, `together` those of the same time. `tap` is where it was taken inside the
+/// line, `esi` where device descriptions are that name types.
 pub(super) fn survey(
     places: &[String],
     together: bool,
+    tap: &TapArguments,
     esi: Option<&Path>,
     stop: &Stop,
     output: &mut Output,
@@ -49,9 +52,14 @@ pub(super) fn survey(
         }
         several => (PathBuf::from(several.join(" + ")), open_several(several, together)?),
     };
+    let tap = tap.links(None)?;
+    if let Some(tap) = &tap {
+        capture = capture.by_tap(tap.tap());
+    }
     let setup = Setup {
         source: format!("capture:{}", path.display()),
         clock: "capture".to_owned(),
+        tap_places: tap.as_ref().map(TapLinks::before).unwrap_or_default(),
         ..Setup::default()
     };
     let (mut engine, mut survey) = (Engine::new(setup), Survey::default());
@@ -63,6 +71,9 @@ pub(super) fn survey(
     survey.finish(&mut engine, at, whole.is_complete);
     if engine.diagnosis().network.frames.0 == 0 {
         return Err(nothing_seen(&path, &capture, whole.frames));
+    }
+    if let Some(tap) = &tap {
+        tap.check_all(&engine, &capture, &path.display().to_string(), output)?;
     }
     if let Some(library) = &mut library {
         describe_pdos(&mut survey, &engine, library, output);

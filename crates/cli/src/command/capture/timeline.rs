@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use linesman_capture::timing::timeline::{TimelineReport, timeline};
 
 use super::survey::survey;
+use crate::command::diagnose::tap::TapArguments;
 use crate::command::line_access;
 use crate::drawing::time_axis;
 use crate::exit::Status;
@@ -20,6 +21,8 @@ pub(crate) struct Arguments {
     /// The capture
     #[arg(value_name = "FILE")]
     place: String,
+    #[command(flatten)]
+    tap: TapArguments,
     /// Only trouble: errors, working counters that are too low, refused transfers, gaps, findings
     #[arg(long)]
     trouble: bool,
@@ -37,7 +40,8 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         files::refuse_to_overwrite(path)?;
     }
     let stop = line_access::stop()?;
-    let surveyed = survey(std::slice::from_ref(&arguments.place), false, None, &stop, output)?;
+    let places = std::slice::from_ref(&arguments.place);
+    let surveyed = survey(places, false, &arguments.tap, None, &stop, output)?;
     let mut told = timeline(&surveyed.report, &surveyed.engine.diagnosis());
     if arguments.trouble {
         told.events.retain(|event| event.trouble);

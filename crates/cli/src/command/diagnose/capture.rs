@@ -90,10 +90,7 @@ fn judge_frames(
         return Err(nothing_seen(path, &capture, whole.frames));
     }
     if let Some(tap) = &tap {
-        tap.check(&engine, &capture).map_err(|failure| failure.at(&path.display().to_string()))?;
-        if let Some(unused) = tap.unused(&engine) {
-            output.warn(&unused);
-        }
+        tap.check_all(&engine, &capture, &path.display().to_string(), output)?;
     }
     session.surveyed = survey.and_then(|survey| survey.report(&engine));
     session.tell_rest(&mut engine, output);

@@ -9,20 +9,21 @@ use linesman_proto::topology::{End, Tree};
 use linesman_runtime::capture::{Capture, CaptureTap, TapPlace};
 
 use crate::failure::Failure;
+use crate::output::Output;
 use crate::text::quantity::count;
 
 /// Link at which a recording was taken.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub(crate) struct TapArguments {
     /// The capture was taken at this link inside the line, by a tap or a probe that adds no record: 3.B-4.A is the link
-    /// from SubDevice 3 to SubDevice 4, maindevice-1.A the first one; with --project also by names, K1.B-I1.A. A tap at
-    /// several links: once for each INTERFACE, by its name or number
+    /// from SubDevice 3 to SubDevice 4, maindevice-1.A the first one; by names, K1.B-I1.A, where a project is given. A tap
+    /// at several links: once for each INTERFACE, by its name or number
     #[arg(long = "probe", value_name = "[INTERFACE=]LINK")]
     links: Vec<String>,
 }
 
 /// Links of a tap.
-pub(super) struct TapLinks {
+pub(crate) struct TapLinks {
     channels: Vec<TapLink>,
     places: Vec<TapPlace>,
 }
@@ -39,12 +40,12 @@ struct TapLink {
 
 impl TapArguments {
     /// True if a place was named.
-    pub(super) fn is_wanted(&self) -> bool {
+    pub(crate) fn is_wanted(&self) -> bool {
         !self.links.is_empty()
     }
 
     /// Refuses a place of what is no capture.
-    pub(super) fn refuse(&self, place: &str, why: &str) -> Result<(), Failure> {
+    pub(crate) fn refuse(&self, place: &str, why: &str) -> Result<(), Failure> {
         if !self.is_wanted() {
             return Ok(());
         }
@@ -55,7 +56,7 @@ impl TapArguments {
     }
 
     /// The links; `None` where no place was named. Names are those of the project.
-    pub(super) fn links(&self, project: Option<&Project>) -> Result<Option<TapLinks>, Failure> {
+    pub(crate) fn links(&self, project: Option<&Project>) -> Result<Option<TapLinks>, Failure> {
         let mut links = TapLinks { channels: Vec::new(), places: Vec::new() };
         for written in &self.links {
             links.add(written, project)?;
@@ -66,12 +67,12 @@ impl TapArguments {
 
 impl TapLinks {
     /// SubDevices before each channel.
-    pub(super) fn before(&self) -> Vec<u16> {
+    pub(crate) fn before(&self) -> Vec<u16> {
         self.channels.iter().map(|link| link.before).collect()
     }
 
     /// The same for the reader.
-    pub(super) fn tap(&self) -> CaptureTap {
+    pub(crate) fn tap(&self) -> CaptureTap {
         CaptureTap::new(self.places.clone())
     }
 
@@ -108,7 +109,7 @@ impl TapLinks {
     }
 
     /// Refuses links that the wiring does not have, as far as it is known.
-    pub(super) fn check_wiring(&self, engine: &Engine) -> Result<(), Failure> {
+    pub(crate) fn check_wiring(&self, engine: &Engine) -> Result<(), Failure> {
         let Some(model) = engine.model(Network::default()) else { return Ok(()) };
         let Some(tree) = &model.tree else { return Ok(()) };
         let basis = if model.tree_is_planned { "by the project" } else { "by the capture" };
@@ -116,7 +117,7 @@ impl TapLinks {
     }
 
     /// Refuses what the whole recording contradicts.
-    pub(super) fn check(&self, engine: &Engine, capture: &Capture) -> Result<(), Failure> {
+    fn check(&self, engine: &Engine, capture: &Capture) -> Result<(), Failure> {
         if let Some(fault) = capture.tap_fault() {
             let step = match self.places.as_slice() {
                 [TapPlace { interface: None, .. }] => "leave out `--probe`",
@@ -154,8 +155,23 @@ impl TapLinks {
         self.check_wiring(engine)
     }
 
+    /// Refuses what the whole recording of this name contradicts, and warns where nothing can be placed.
+    pub(crate) fn check_all(
+        &self,
+        engine: &Engine,
+        capture: &Capture,
+        name: &str,
+        output: &Output,
+    ) -> Result<(), Failure> {
+        self.check(engine, capture).map_err(|failure| failure.at(name))?;
+        if let Some(unused) = self.unused(engine) {
+            output.warn(&unused);
+        }
+        Ok(())
+    }
+
     /// Reason for which nothing can be placed although a link was named; `None` where frames passed it both ways.
-    pub(super) fn unused(&self, engine: &Engine) -> Option<String> {
+    fn unused(&self, engine: &Engine) -> Option<String> {
         let model = engine.model(Network::default())?;
         let first = self.channels.first()?;
         model.capture_probe.order.is_empty().then(|| {
@@ -239,7 +255,7 @@ fn end(written: &str, end: &Attachment, project: Option<&Project>) -> Result<End
     let step = match project {
         Some(_) => "use a name of the project, or the number of the SubDevice as in `3.B-4.A`",
         None => {
-            "name SubDevices by their numbers as in `3.B-4.A`, or give the names by `--project`"
+            "name SubDevices by their numbers as in `3.B-4.A`; names need a project beside the capture"
         }
     };
     Err(Failure::new(reason, step))

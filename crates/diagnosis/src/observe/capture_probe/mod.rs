@@ -96,6 +96,7 @@ impl ProbePassages {
         match self.use_of_ports {
             UseOfPorts::Unknown => {
                 self.order.note(port, frame, record);
+                self.vote_by_held(frame, port, record);
                 self.held.push(Copied::of(frame, port, record));
                 if self.held.len() == HELD {
                     self.decide(out);
@@ -140,6 +141,19 @@ impl ProbePassages {
         self.use_of_ports = UseOfPorts::OneLine;
         for copy in held {
             self.track(&copy.seen(Default::default()), copy.port, copy.record, out);
+        }
+    }
+
+    /// Copies of the same frame that are held back tell the order of the ports before it is known how they are used.
+    fn vote_by_held(&mut self, frame: &FrameSeen<'_>, port: u8, record: EslRecord) {
+        let parsed = FrameView::parse(frame.bytes).ok().filter(|_| !record.is_damaged());
+        let Some(key) = parsed.as_ref().map(key) else { return };
+        for copy in &self.held {
+            let held = copy.seen(Default::default());
+            let is_same = FrameView::parse(held.bytes).is_ok_and(|view| self::key(&view) == key);
+            if is_same && copy.port != port && frame.time.since(held.time) < LONGEST {
+                self.order.vote(copy.port, held.time, port, frame.time);
+            }
         }
     }
 

@@ -86,6 +86,20 @@ impl PortOrder {
         self.port(other).is_some() && self.rank(other) < self.rank(number)
     }
 
+    /// True if a copy at a port is of a frame that comes back, false if it goes out; `None` while no frame was seen at
+    /// both ports of the channel, as in a ring.
+    #[must_use]
+    pub fn comes_back(&self, number: u8) -> Option<bool> {
+        if self.is_tap() {
+            return Some(number % 2 == 1);
+        }
+        let votes =
+            |one: u8, other: u8| self.votes.get(usize::from(one))?.get(usize::from(other)).copied();
+        let other = number ^ 1;
+        let is_known = votes(number, other)? + votes(other, number)? > 0;
+        is_known.then(|| self.is_back(number))
+    }
+
     /// SubDevices before a port: as the user says of the way out of a tap, else as broadcasts tell.
     #[must_use]
     pub fn before(&self, number: u8) -> Option<u16> {

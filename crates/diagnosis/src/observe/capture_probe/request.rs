@@ -54,10 +54,12 @@ impl ProbeReach {
     pub(super) fn mask(&mut self, request: &mut [u8], reply: &mut [u8]) {
         let (Some(sent), Some(back)) = (places(request), places(reply)) else { return };
         for (sent, back) in sent.into_iter().zip(back) {
-            let is_answered = word(reply, back.counter_at) > 0;
             let address = word(reply, back.at + 2);
-            let addressing = Command::from_code(reply[back.at]).map(Command::addressing);
-            let is_unreached = match addressing {
+            let effect = Command::from_code(reply[back.at]).map(Command::effect);
+            // Of ARMW and FRMW all others count what they write, too: the one that is addressed need not have answered.
+            let is_answered = word(reply, back.counter_at) > 0
+                && effect.is_some_and(|effect| !effect.multiple_write);
+            let is_unreached = match effect.map(|effect| effect.addressing) {
                 // Each SubDevice counts it up, and the one that finds 0 is meant.
                 Some(Addressing::Position) => address == 0 || address > 0x7FFF,
                 Some(Addressing::Station) => {
@@ -116,4 +118,43 @@ fn places(bytes: &[u8]) -> Option<Vec<DatagramAt>> {
 
 fn word(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame of one datagram with eight bytes of data, to a station address.
+    fn frame(command: Command, station: u16, working_counter: u16) -> Vec<u8> {
+        let mut bytes = vec![2; 12];
+        bytes.extend([0x88, 0xA4, 20, 0x10, command.code(), 0]);
+        bytes.extend(station.to_le_bytes());
+        bytes.extend([0x10, 0x09, 8, 0, 0, 0]);
+        bytes.extend([0; 8]);
+        bytes.extend(working_counter.to_le_bytes());
+        bytes
+    }
+
+    /// True if a frame that comes back with this counter is left as it is, beside one that was answered before.
+    fn is_kept(command: Command, working_counter: u16) -> bool {
+        let mut reach = ProbeReach::of_plan(false);
+        let (mut request, mut reply) =
+            (frame(command, 0x1007, 0), frame(command, 0x1007, working_counter));
+        reach.mask(&mut request, &mut reply);
+        reply[ETHERNET_LEN + ETHERCAT_HEADER_LEN] == command.code()
+    }
+
+    /// Length of the Ethernet header.
+    const ETHERNET_LEN: usize = 14;
+
+    #[test]
+    fn station_that_a_read_reached_is_kept_and_one_beyond_the_probe_is_taken_out() {
+        assert!(is_kept(Command::Fprd, 1));
+        assert!(!is_kept(Command::Fprd, 0));
+    }
+
+    #[test]
+    fn frmw_counted_by_writers_alone_does_not_show_that_its_station_was_reached() {
+        assert!(!is_kept(Command::Frmw, 1));
+    }
 }
