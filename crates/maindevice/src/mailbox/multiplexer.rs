@@ -1,14 +1,16 @@
-//! The mailbox of one SubDevice: sending, fetching, counting, repeating.
+//! The mailbox of one SubDevice: sending, and handing on what is fetched.
 //!
 //! Reference: S1 8.2 (mailbox mode of SyncManagers, repeat), ETG.1000.4. Writing into a full mailbox
 //! and reading from an empty one is denied by the SyncManager, working counter 0.
+
+mod fetch;
 
 use linesman_config::plan::DevicePlan;
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::ads::AmsNetId;
 use linesman_proto::mailbox::coe::Message as CoeMessage;
 use linesman_proto::mailbox::{self, Counter, Header, MailboxType, Message, eoe, soe};
-use linesman_proto::register::{SYNC_MANAGER, SmActivate, SmPdiControl, SmStatus};
+use linesman_proto::register::{SYNC_MANAGER, SmStatus};
 use linesman_proto::sii::{MailboxPair, Protocols};
 use linesman_proto::time::{Instant, Span};
 
@@ -23,11 +25,8 @@ use crate::executor::Wire;
 const OUT: u16 = 0;
 const IN: u16 = 1;
 const STATUS_AT: u16 = 5;
-const ACTIVATE_AT: u16 = 6;
-const PDI_CONTROL_AT: u16 = 7;
 const FIRST_POLL: Span = Span::us(500);
 const SLOWEST_POLL: Span = Span::ms(10);
-const REPEAT_LIMIT: Span = Span::ms(100);
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long while an answer is
 /// waited for: cyclic frames may be lost.
 const UNSEEN: Span = Span::ms(50);
@@ -340,81 +339,6 @@ impl Multiplexer {
             }
         }
         true
-    }
-
-    /// The message in the mailbox, if there is a new one.
-    async fn fetch(&mut self) -> Result<Option<Vec<u8>>, ExchangeError> {
-        if self.repetition_due {
-            self.fetch_again().await?;
-        }
-        // What the cycle has seen need not be asked for.
-        if !self.queues.take_full(self.id) && !self.is_full(IN).await? {
-            return Ok(None);
-        }
-        let area = self.areas.send;
-        let mut uncertain = false;
-        for _ in 0..3 {
-            let read = Request::read(self.target, area.offset, area.size);
-            match self.wire.submit(read).await {
-                Ok(reply) if reply.answered() => {
-                    let counter = Header::parse(&reply.data).map(|header| header.counter);
-                    let counter = counter.unwrap_or_default();
-                    // Only after a repeated fetch can it be one that we have had: a SubDevice that
-                    // does not count on is understood all the same.
-                    let again = std::mem::take(&mut self.fetched_again);
-                    if again && counter.repeats(self.received) {
-                        return Ok(None);
-                    }
-                    self.missing |= uncertain && counter.skips(self.received);
-                    (self.received, self.first_is_due) = (counter, false);
-                    return Ok(Some(reply.data.into_vec()));
-                }
-                Ok(_) => return Ok(None),
-                Err(error @ ExchangeError::WorkingCounter { .. }) => return Err(error),
-                // The frame got lost on its way there or back.
-                Err(ExchangeError::NoReply { .. }) => {
-                    uncertain = true;
-                    self.repetition_due = true;
-                    self.fetch_again().await?;
-                }
-            }
-        }
-        Ok(None)
-    }
-
-    /// Makes sure that a message is not missed whose frame was lost. What is in the mailbox now is the
-    /// same one or the next one, which only counters tell apart: a SubDevice that counts puts the one
-    /// before in again in either case, and takes out the next one for it. One that somebody else has
-    /// fetched is not asked for.
-    async fn fetch_again(&mut self) -> Result<(), ExchangeError> {
-        let known = self.received != Counter::NONE || self.first_is_due;
-        if known && self.repeats_on_request || !self.is_full(IN).await? {
-            self.repetitions = self.repetitions.wrapping_add(1);
-            self.fetched_again = true;
-            self.repeats_on_request = self.ask_for_repetition().await?;
-        }
-        self.repetition_due = false;
-        Ok(())
-    }
-
-    /// Whether the SubDevice has put the last message in again, as far as it says.
-    async fn ask_for_repetition(&self) -> Result<bool, ExchangeError> {
-        let at = byte_of(IN, ACTIVATE_AT);
-        let reply = self.wire.read_one(self.target, at, 1).await?;
-        let activate = SmActivate(reply.bytes::<1>(0)[0]);
-        let asked = !activate.repeat_request();
-        let toggled = activate.with_repeat_request(asked);
-        self.wire.write_one(self.target, at, &[toggled.0]).await?;
-        let until = self.wire.now() + REPEAT_LIMIT;
-        while self.wire.now() < until {
-            let reply = self.wire.read_one(self.target, byte_of(IN, PDI_CONTROL_AT), 1).await?;
-            let acknowledged = SmPdiControl(reply.bytes::<1>(0)[0]).repeat_acknowledge();
-            if acknowledged == asked {
-                return Ok(true);
-            }
-            self.wire.sleep(FIRST_POLL).await;
-        }
-        Ok(false)
     }
 
     /// Hands a message on by its type. What may be an answer of the protocol that is `wanted` is
