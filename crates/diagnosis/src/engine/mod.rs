@@ -5,6 +5,7 @@ mod bisect;
 mod fast_poll;
 mod hot_connect;
 mod intake;
+mod known;
 mod network_watch;
 mod setup;
 
@@ -17,8 +18,7 @@ use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Finding, FindingStore, Severity};
 use crate::model::{NetworkModel, search};
-use crate::observe::capture_probe::PortOrder;
-use crate::observe::{Exchange, FrameSeen, HostEvent, HostObservation, LatestFrame, Pairing};
+use crate::observe::{Exchange, FrameSeen, HostEvent, HostObservation, Pairing};
 use crate::report::{
     self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
 };
@@ -263,28 +263,6 @@ impl Engine {
     #[must_use]
     pub const fn book(&self) -> &FindingStore {
         &self.book
-    }
-
-    /// What is known of a network; `None` before its first frame.
-    #[must_use]
-    pub fn model(&self, network: Network) -> Option<&NetworkModel> {
-        let mut all = self.networks.iter().map(|watched| &watched.model);
-        all.find(|model| model.network == network)
-    }
-
-    /// What the latest frame of a network turned out to be; `None` before its first frame.
-    #[must_use]
-    pub fn latest_frame(&self, network: Network) -> Option<&LatestFrame> {
-        let mut all = self.networks.iter();
-        all.find(|watched| watched.model.network == network).map(|watched| &watched.latest)
-    }
-
-    /// The ports of the capture probe of a network, as the copies so far tell; `None` before the first one.
-    #[must_use]
-    pub fn probe_ports(&self, network: Network) -> Option<&PortOrder> {
-        let mut all = self.networks.iter();
-        all.find(|watched| watched.model.network == network)
-            .map(|watched| watched.capture_probe.order())
     }
 
     fn watched(&mut self, network: Network) -> &mut NetworkWatch {
