@@ -117,13 +117,13 @@ impl ControlSocketWatch {
 /// A request, and who waits for its answer.
 pub(crate) struct Asked<P: Protocol> {
     pub(crate) order: P::Order,
-    pub(crate) asker: Asker<P>,
+    pub(crate) requester: Requester<P>,
 }
 
 /// Who waits for an answer.
-pub(crate) struct Asker<P: Protocol>(Sender<P::Reply>);
+pub(crate) struct Requester<P: Protocol>(Sender<P::Reply>);
 
-impl<P: Protocol> Asker<P> {
+impl<P: Protocol> Requester<P> {
     pub(crate) fn give(self, reply: P::Reply) {
         // Whoever asked may have lost patience.
         let _ = self.0.send(reply);
@@ -150,7 +150,7 @@ impl<P: Protocol> RequestSender<P> {
     /// Sends a request; `None` when too many wait, or nobody does them any more.
     pub(crate) fn send(&self, request: P::Request) -> Option<SentRequest<P>> {
         let (reply, answer) = mpsc::channel();
-        let asked = Asked { order: P::order(request), asker: Asker(reply) };
+        let asked = Asked { order: P::order(request), requester: Requester(reply) };
         let asked = self.requests.try_send(asked);
         self.wake_handle.wake();
         asked.ok().map(|()| SentRequest(answer))

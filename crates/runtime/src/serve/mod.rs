@@ -159,7 +159,7 @@ impl Server {
                 while let Some(asked) = control.poll() {
                     let answer = apply(now, &asked.order, self);
                     self.tell(&mut beside.truth_writer);
-                    asked.asker.give(answer);
+                    asked.requester.give(answer);
                 }
             }
             self.wiring.carry(self.segment.signals_mut());

@@ -22,7 +22,7 @@ use linesman_proto::time::Instant;
 
 use self::message::{Answer, Asked as AskedService, FileUnderWay, Request};
 pub use crate::control_socket::ControlSocketWatch;
-use crate::control_socket::{self, Asked, Asker, ControlSocket, Protocol, ask_line};
+use crate::control_socket::{self, Asked, ControlSocket, Protocol, Requester, ask_line};
 use crate::online::{OnlineState, Rates, Snapshot};
 use crate::run::report::RunReport;
 
@@ -38,7 +38,7 @@ pub(crate) struct ServiceProtocol {
 pub const LONGEST_FILE: u64 = 64 << 20;
 
 /// What the thread that runs the line does for somebody.
-pub(crate) enum ServiceOrder {
+pub(crate) enum PreparedRequest {
     Status,
     Online,
     Errors,
@@ -75,7 +75,7 @@ pub(crate) enum ServiceReply {
 
 impl Protocol for ServiceProtocol {
     type Request = Request;
-    type Order = ServiceOrder;
+    type Order = PreparedRequest;
     type Reply = ServiceReply;
     type Answer = Answer;
     const WHO: &'static str = "MainDevice";
@@ -84,16 +84,16 @@ impl Protocol for ServiceProtocol {
     // Two digits for each byte of a file, and what stands around it.
     const LONGEST: u64 = 2 * LONGEST_FILE + control_socket::MOST;
 
-    fn order(request: Request) -> ServiceOrder {
+    fn order(request: Request) -> PreparedRequest {
         match request {
-            Request::Status => ServiceOrder::Status,
-            Request::Online => ServiceOrder::Online,
-            Request::Errors => ServiceOrder::Errors,
-            Request::Clear { errors, frames } => ServiceOrder::Clear { errors, frames },
-            Request::Files => ServiceOrder::Files,
-            Request::Reset => ServiceOrder::Reset,
+            Request::Status => PreparedRequest::Status,
+            Request::Online => PreparedRequest::Online,
+            Request::Errors => PreparedRequest::Errors,
+            Request::Clear { errors, frames } => PreparedRequest::Clear { errors, frames },
+            Request::Files => PreparedRequest::Files,
+            Request::Reset => PreparedRequest::Reset,
             Request::Serve { no, service } => {
-                ServiceOrder::Serve { no, service: service.service() }
+                PreparedRequest::Serve { no, service: service.service() }
             }
         }
     }
@@ -194,7 +194,7 @@ pub(crate) struct PendingServices {
 struct PendingService {
     ticket: ServiceTicket,
     id: DeviceId,
-    asker: Asker<ServiceProtocol>,
+    requester: Requester<ServiceProtocol>,
     moves_file: bool,
     /// How far its file has come, if it moves one.
     file: Option<FileProgress>,
@@ -214,27 +214,27 @@ impl PendingServices {
         main: &mut MainDevice,
         report: impl Fn(&MainDevice) -> RunReport,
     ) {
-        let Asked { order, asker } = asked;
+        let Asked { order, requester } = asked;
         match order {
-            ServiceOrder::Status => asker.answer(Answer::status(report(main))),
-            ServiceOrder::Online => {
+            PreparedRequest::Status => requester.answer(Answer::status(report(main))),
+            PreparedRequest::Online => {
                 let snapshot = Snapshot::of(main, now, &self.rates);
-                asker.give(ServiceReply::Snapshot(Box::new(snapshot)));
+                requester.give(ServiceReply::Snapshot(Box::new(snapshot)));
             }
-            ServiceOrder::Errors => asker.give(ServiceReply::Errors),
-            ServiceOrder::Files => asker.answer(Answer::files(self.files())),
-            ServiceOrder::Clear { errors, frames } => {
+            PreparedRequest::Errors => requester.give(ServiceReply::Errors),
+            PreparedRequest::Files => requester.answer(Answer::files(self.files())),
+            PreparedRequest::Clear { errors, frames } => {
                 if errors {
                     main.clear_counts();
                 }
                 let frames = frames.then(|| main.statistics());
-                asker.give(ServiceReply::Clear { errors, frames });
+                requester.give(ServiceReply::Clear { errors, frames });
             }
-            ServiceOrder::Reset => asker.answer(match main.reset() {
+            PreparedRequest::Reset => requester.answer(match main.reset() {
                 true => Answer::done(),
                 false => Answer::refusal(NOT_UP.to_owned()),
             }),
-            ServiceOrder::Serve { no, service } => match prepared(main, no, service) {
+            PreparedRequest::Serve { no, service } => match prepared(main, no, service) {
                 Ok((id, service)) => {
                     let moves_file = matches!(
                         service,
@@ -243,9 +243,15 @@ impl PendingServices {
                         )
                     );
                     let ticket = main.serve(now, id, service);
-                    self.pending.push(PendingService { ticket, id, asker, moves_file, file: None });
+                    self.pending.push(PendingService {
+                        ticket,
+                        id,
+                        requester,
+                        moves_file,
+                        file: None,
+                    });
                 }
-                Err(why) => asker.answer(Answer::refusal(why)),
+                Err(why) => requester.answer(Answer::refusal(why)),
             },
         }
     }
@@ -258,7 +264,7 @@ impl PendingServices {
     ) {
         if let Some(at) = self.pending.iter().position(|pending| pending.ticket == ticket) {
             let result = ServiceReply::Served(Box::new(result.clone()));
-            self.pending.swap_remove(at).asker.give(result);
+            self.pending.swap_remove(at).requester.give(result);
         }
     }
 
@@ -278,7 +284,7 @@ impl PendingServices {
     }
 }
 
-impl Asker<ServiceProtocol> {
+impl Requester<ServiceProtocol> {
     fn answer(self, answer: Answer) {
         self.give(ServiceReply::Answer(Box::new(answer)));
     }
