@@ -55,7 +55,7 @@ pub(crate) trait Protocol: Send + Sync + 'static {
     /// Longest request in bytes.
     const LONGEST: u64;
 
-    /// What a request asks for. Threads that talk to those who ask find that out, too.
+    /// Reads a request to its end. Threads that talk to those who ask do that, too.
     fn order(request: Self::Request) -> Self::Order;
 
     /// What is answered when this was given. Threads that talk to those who ask do that, so that the
@@ -120,7 +120,7 @@ pub(crate) struct Asked<P: Protocol> {
     pub(crate) requester: Requester<P>,
 }
 
-/// Who waits for an answer.
+/// Way back to whoever waits for an answer.
 pub(crate) struct Requester<P: Protocol>(Sender<P::Reply>);
 
 impl<P: Protocol> Requester<P> {
@@ -165,7 +165,7 @@ impl<P: Protocol> RequestSender<P> {
 /// A request whose answer is waited for.
 pub(crate) struct SentRequest<P: Protocol>(Receiver<P::Reply>);
 
-/// What follows a request on its connection.
+/// Rest of a connection after a request.
 enum After {
     /// The next one.
     Next,

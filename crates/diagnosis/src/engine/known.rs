@@ -8,19 +8,19 @@ use crate::observe::capture_probe::PortOrder;
 use linesman_proto::address::Network;
 
 impl Engine {
-    /// What is known of a network; `None` before its first frame.
+    /// Knowledge of a network; `None` before its first frame.
     #[must_use]
     pub fn model(&self, network: Network) -> Option<&NetworkModel> {
         self.watch_of(network).map(|watched| &watched.model)
     }
 
-    /// What the latest frame of a network turned out to be; `None` before its first frame.
+    /// Latest frame of a network, as far as it was understood; `None` before its first frame.
     #[must_use]
     pub fn latest_frame(&self, network: Network) -> Option<&LatestFrame> {
         self.watch_of(network).map(|watched| &watched.latest)
     }
 
-    /// The ports of the capture probe of a network, as the copies so far tell; `None` before the first one.
+    /// Ports of the capture probe of a network, as the copies so far tell; `None` before the first one.
     #[must_use]
     pub fn probe_ports(&self, network: Network) -> Option<&PortOrder> {
         self.watch_of(network).map(|watched| watched.capture_probe.order())

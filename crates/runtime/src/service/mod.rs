@@ -37,7 +37,7 @@ pub(crate) struct ServiceProtocol {
 /// Longest file that is brought through the socket, in bytes: more than any SubDevice holds.
 pub const LONGEST_FILE: u64 = 64 << 20;
 
-/// What the thread that runs the line does for somebody.
+/// Request as the thread that runs the line takes it.
 pub(crate) enum PreparedRequest {
     Status,
     Online,
@@ -51,7 +51,7 @@ pub(crate) enum PreparedRequest {
     Serve {
         /// Number of the SubDevice in the plan, from 1.
         no: u32,
-        /// What is to be done, or why that cannot be read.
+        /// The service, or the reason why it cannot be read.
         service: Result<Service, String>,
     },
 }
@@ -59,7 +59,7 @@ pub(crate) enum PreparedRequest {
 /// What the thread that runs the line gives.
 pub(crate) enum ServiceReply {
     Answer(Box<Answer>),
-    /// What a service gave.
+    /// Result of a service.
     Served(Box<Result<ServiceAnswer, ServiceFailure>>),
     /// The line as it is now.
     Snapshot(Box<Snapshot>),
@@ -196,7 +196,7 @@ struct PendingService {
     id: DeviceId,
     requester: Requester<ServiceProtocol>,
     moves_file: bool,
-    /// How far its file has come, if it moves one.
+    /// State of its file, if it moves one.
     file: Option<FileProgress>,
 }
 

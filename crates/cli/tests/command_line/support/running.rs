@@ -105,7 +105,7 @@ impl Running {
         self.ask(r#"{"do":"status"}"#)["run"].clone()
     }
 
-    /// What its socket answers to a line of JSON.
+    /// Answer of its socket to a line of JSON.
     #[track_caller]
     pub(crate) fn ask(&self, request: &str) -> Value {
         let mut stream = UnixStream::connect(self.socket()).unwrap();

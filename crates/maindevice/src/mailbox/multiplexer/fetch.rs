@@ -70,7 +70,7 @@ impl Multiplexer {
         Ok(())
     }
 
-    /// Whether the SubDevice has put the last message in again, as far as it says.
+    /// Asks the SubDevice to put the last message in again. True once it says that it has.
     async fn ask_for_repetition(&self) -> Result<bool, ExchangeError> {
         let at = byte_of(IN, ACTIVATE_AT);
         let reply = self.wire.read_one(self.target, at, 1).await?;

@@ -156,7 +156,7 @@ impl CommandState {
 }
 
 impl CommandProgress {
-    /// Whether its execution has ended, well or not.
+    /// True if its execution has ended, well or not.
     #[must_use]
     pub const fn has_ended(self) -> bool {
         matches!(self, Self::Done | Self::Failed)

@@ -137,7 +137,7 @@ impl SoeServer {
         }))
     }
 
-    /// When a procedure command ends next.
+    /// Time at which a procedure command ends next.
     pub(super) fn next_end(&self) -> Option<Instant> {
         let running = self
             .commands
@@ -266,7 +266,7 @@ impl SoeServer {
 }
 
 impl SetCommand {
-    /// How long it takes.
+    /// Time that it takes.
     fn takes(&self) -> Span {
         match DriveParameter::find(self.idn).map(|parameter| &parameter.source) {
             Some(ValueSource::Command(takes)) => *takes,
