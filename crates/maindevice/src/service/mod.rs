@@ -69,6 +69,18 @@ pub enum Service {
     },
 }
 
+impl Service {
+    /// True if it moves a file, of which [`Event::FileProgress`](crate::Event::FileProgress) tells how far it has
+    /// come.
+    #[must_use]
+    pub const fn moves_file(&self) -> bool {
+        matches!(
+            self,
+            Self::Mailbox(MailboxRequest::ReadFile { .. } | MailboxRequest::WriteFile { .. })
+        )
+    }
+}
+
 /// What a service gives.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum ServiceAnswer {

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use linesman_link::socket::WakeHandle;
-use linesman_maindevice::mailbox::{FileProgress, MailboxRequest};
+use linesman_maindevice::mailbox::FileProgress;
 use linesman_maindevice::service::{Service, ServiceAnswer, ServiceFailure, ServiceTicket};
 use linesman_maindevice::{MainDevice, Statistics};
 use linesman_proto::address::DeviceId;
@@ -236,12 +236,7 @@ impl PendingServices {
             }),
             PreparedRequest::Serve { no, service } => match prepared(main, no, service) {
                 Ok((id, service)) => {
-                    let moves_file = matches!(
-                        service,
-                        Service::Mailbox(
-                            MailboxRequest::ReadFile { .. } | MailboxRequest::WriteFile { .. }
-                        )
-                    );
+                    let moves_file = service.moves_file();
                     let ticket = main.serve(now, id, service);
                     self.pending.push(PendingService {
                         ticket,

@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use linesman_diagnosis::Diagnosis;
-use linesman_maindevice::mailbox::MailboxRequest;
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::sii::Identity;
@@ -81,7 +80,7 @@ impl ServiceClient for SocketClient {
         id: DeviceId,
         service: Service,
     ) -> Result<Result<ServiceAnswer, ServiceRefused>, Failure> {
-        let asked = match moves_a_file(&service) && io::stderr().is_terminal() {
+        let asked = match service.moves_file() && io::stderr().is_terminal() {
             true => ask_showing_progress(&self.path, id, &service),
             false => service::ask(&self.path, id.no(), &service),
         };
@@ -105,13 +104,6 @@ impl ServiceClient for SocketClient {
         // The run tells them itself.
         Vec::new()
     }
-}
-
-fn moves_a_file(service: &Service) -> bool {
-    matches!(
-        service,
-        Service::Mailbox(MailboxRequest::ReadFile { .. } | MailboxRequest::WriteFile { .. })
-    )
 }
 
 /// Asks for a file to be moved, and meanwhile how far it has come.
