@@ -44,7 +44,7 @@ pub(super) struct Outbox {
     sent: Counter,
     /// The last message that was put into SyncManager 1.
     last: Vec<u8>,
-    /// The one before it, which the MainDevice has fetched. Empty if there is none.
+    /// The one before it, which the MainDevice has fetched. Empty if there is none, or it was repeated.
     fetched: Vec<u8>,
     /// A message that was taken out of SyncManager 1 for one that is repeated, and goes in after it.
     taken_out: Option<Vec<u8>>,
@@ -110,6 +110,7 @@ impl Outbox {
         if !pdi.mailbox_full(ANSWERS) {
             if !self.last.is_empty() {
                 pdi.write_sync_manager(ANSWERS, &self.last);
+                self.fetched.clear();
             }
         } else if !self.fetched.is_empty() {
             pdi.deactivate_sync_manager(ANSWERS, true);

@@ -89,6 +89,13 @@ fn lost_answer_is_repeated_before_the_next_message_that_waits_already() {
         assert_eq!(code(device.fetch_soon()), Some(expected));
     }
     assert!(device.fetch_soon().is_none());
+    // The same with an empty mailbox: the last one comes once more, and none before it.
+    for request in [0x01, 0x03] {
+        device.bench.write(0x080E, &[request]);
+        device.bench.wait(Span::ms(1));
+    }
+    assert_eq!(code(device.fetch_soon()), Some(3));
+    assert!(device.fetch_soon().is_none());
 }
 
 #[test]
