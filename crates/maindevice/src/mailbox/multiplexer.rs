@@ -48,7 +48,7 @@ pub(crate) struct Multiplexer {
     protocols: Protocols,
     /// Counter of the last message that was sent; `None` before the first.
     sent: Option<Counter>,
-    /// Counter of the last message that was fetched; `NONE` before the first, and if it does not count.
+    /// Counter of the last message that was fetched; `NONE` before the first, and of a SubDevice that does not count.
     received: Counter,
     /// The SubDevice has begun anew, and nobody has fetched a message since.
     first_is_due: bool,
@@ -56,7 +56,7 @@ pub(crate) struct Multiplexer {
     fetched_again: bool,
     /// A frame that fetched was lost, and the SubDevice has not been asked yet to put its message in again.
     repetition_due: bool,
-    /// The SubDevice did so when it was asked last, or has not been asked yet.
+    /// True unless the SubDevice left it unanswered when it was last asked to put a message in again.
     repeats_on_request: bool,
     /// A message is missing: its frame was lost, and the SubDevice did not put it in again.
     missing: bool,

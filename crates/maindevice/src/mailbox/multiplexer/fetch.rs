@@ -57,8 +57,9 @@ impl Multiplexer {
 
     /// Makes sure that a message is not missed whose frame was lost. What is in the mailbox now is the
     /// same one or the next one, which only counters tell apart: a SubDevice that counts puts the one
-    /// before in again in either case, and takes out the next one for it. One that somebody else has
-    /// fetched is not asked for.
+    /// before in again in either case, and takes out the next one for it. While nothing is known of its
+    /// counters it is asked only where the mailbox is empty: otherwise it might repeat what somebody else
+    /// has fetched.
     async fn fetch_again(&mut self) -> Result<(), ExchangeError> {
         let known = self.received != Counter::NONE || self.first_is_due;
         if known && self.repeats_on_request || !self.is_full(IN).await? {
