@@ -1,7 +1,7 @@
 //! Control of a running segment from outside, through a socket in the file system: faults, inputs,
 //! events, status.
 //!
-//! What can be asked is in [`message`]; the socket itself is that of [`control_socket`].
+//! Requests and answers are in [`message`]; the socket itself is that of [`control_socket`].
 
 mod apply;
 pub mod message;

@@ -259,7 +259,8 @@ impl PendingServices {
     ) {
         if let Some(at) = self.pending.iter().position(|pending| pending.ticket == ticket) {
             let result = ServiceReply::Served(Box::new(result.clone()));
-            self.pending.swap_remove(at).requester.give(result);
+            // In their order: of two files of a SubDevice the first one is under way.
+            self.pending.remove(at).requester.give(result);
         }
     }
 
