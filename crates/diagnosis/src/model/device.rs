@@ -11,6 +11,7 @@ use linesman_proto::register::{
     ControllerType, DlControl, EscInformation, FmmuConfig, WatchdogDivider, WatchdogTime,
 };
 use linesman_proto::sii::Identity;
+use linesman_proto::state::AlStatusCode;
 use linesman_proto::state::status_code::Class as CodeClass;
 use linesman_proto::time::{DcTime32, Instant, Span};
 use linesman_proto::topology::SeenController;
@@ -385,12 +386,17 @@ impl Device {
 
     /// Whether it signalled, within a stretch of time or soon after it, that it has lost its step with the SYNC signal
     /// or the frames: an AL status code of the class timing, or an error whose code nobody has read. Who was away just
-    /// then has lost it by that.
+    /// then has lost it by that. Outputs stayed away for `longest` at most, where that is known: a watchdog that holds
+    /// for longer expired by something else.
     #[must_use]
-    pub fn lost_step_within(&self, from: Instant, to: Instant) -> bool {
+    pub fn lost_step_within(&self, from: Instant, to: Instant, longest: Option<Span>) -> bool {
+        let may_starve = |span| longest.is_none_or(|longest| span <= longest);
+        let is_starved = self.watchdog.span().is_some_and(may_starve);
         self.al.errors.iter().any(|error| {
-            let is_timing =
-                error.code.is_none_or(|code| code.value.explain().class == CodeClass::Timing);
+            let is_timing = error.code.is_none_or(|code| {
+                let is_watchdog = code.value == AlStatusCode::SYNC_MANAGER_WATCHDOG;
+                code.value.explain().class == CodeClass::Timing && (is_starved || !is_watchdog)
+            });
             let at = error.status.at;
             let was_away = self.absences.iter().any(|one| one.disturbs(at));
             is_timing && !error.may_be_echo() && !was_away && at >= from && at <= to + READ_WITHIN

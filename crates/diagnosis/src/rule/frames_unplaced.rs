@@ -185,7 +185,8 @@ fn explains_losses(condition: &Condition, first: Instant, last: Instant) -> bool
 fn out_of_step(model: &NetworkModel) -> impl Iterator<Item = DeviceId> {
     let lost = model.traffic.losses.times();
     let follows = move |device: &&Device| {
-        let has_lost = |at: &&Instant| device.lost_step_within(**at, **at);
+        // How many in a row are lost is not known of each time.
+        let has_lost = |at: &&Instant| device.lost_step_within(**at, **at, None);
         lost.iter().filter(has_lost).nth(FOR_A_STEP - 1).is_some()
     };
     model.devices.iter().filter(follows).map(|device| device.id)

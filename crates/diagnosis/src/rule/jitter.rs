@@ -139,7 +139,9 @@ fn judge(view: &View<'_>, conditions: &mut Vec<Condition>) {
         (FaultName::LateFrames, FaultName::HostJitter)
     };
     // What was lost before, or by another cause, is none of its doing.
-    let hurt = in_step.iter().filter(|device| device.lost_step_within(first.at, last.at));
+    let longest = spell.cycle + spell.worst();
+    let is_hurt = |device: &&&Device| device.lost_step_within(first.at, last.at, Some(longest));
+    let hurt = in_step.iter().filter(is_hurt);
     let mut condition = Condition::new(&PAGE, Place::Host, cause, first.at)
         .confidence(if spell.at_sending { 0.7 } else { 0.6 })
         .or(other, 0.25)

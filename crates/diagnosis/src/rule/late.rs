@@ -205,7 +205,9 @@ fn hurt<'m>(
         let mut known = known.iter().filter(|one| one.page.class == Class::Hardware);
         known.any(|one| one.explains.contains(&lost))
     };
-    let lost_step = |device: &&Device| device.lost_step_within(late.first.sent, until);
+    let lost_step = |device: &&Device| {
+        device.lost_step_within(late.first.sent, until, Some(cycle + late.worst))
+    };
     in_step.filter(lost_step).filter(|device| !(is_slight && is_explained(device))).collect()
 }
 

@@ -86,6 +86,29 @@ fn watchdog_expired_while_it_is_listened_is_at_its_subdevice() {
 }
 
 #[test]
+fn frames_late_by_less_than_a_watchdog_holds_explain_a_lost_step_and_no_expired_watchdog() {
+    let rows = [(WATCHDOG, "S202"), (OUT_OF_STEP, "T411")];
+    for (error, expected) in rows {
+        let mut script = listening(SOEM, None);
+        cycles(&mut script, 600, 6, 0x1001, &[Some(OP); 3]);
+        let late = [lrw(0x0100_0000, 8, 6)];
+        for _ in 0..3 {
+            script.send(&late);
+            script.now += 1_500_000;
+            script.give_back(&late);
+            script.index = script.index.wrapping_add(1);
+            cycles(&mut script, 20, 6, 0x1001, &[Some(OP), Some(OP), Some(error)]);
+            cycles(&mut script, 20, 6, 0x1001, &[Some(OP); 3]);
+        }
+        let report = report(&mut script);
+        let first = &report.findings[0];
+        assert_eq!(first.code, expected, "{}", text(&report));
+        let lost_step = first.consequences.iter().any(|one| one.code == "T400");
+        assert_eq!(lost_step, expected == "T411", "{}", text(&report));
+    }
+}
+
+#[test]
 fn subdevice_that_is_given_its_address_anew_has_started_anew() {
     let mut script = listening(SOEM, None);
     cycles(&mut script, 20, 4, 0x1001, &[Some(OP), Some(OP), None]);
