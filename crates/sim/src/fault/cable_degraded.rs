@@ -27,7 +27,8 @@ pub(super) const KIND: Kind = Kind {
         let period = start.milliseconds("movement_ms");
         let mut stream = start.stream.clone();
         if let Some(count) = start.values.whole("hits") {
-            return Ok(frame_hits(count, interval, &start.target.directions, &mut stream));
+            let hits = &mut start.hits.unwrap_or(stream);
+            return Ok(frame_hits(count, interval, &start.target.directions, hits));
         }
         let envelope = match period.as_nanos() {
             0 => Envelope::Constant,

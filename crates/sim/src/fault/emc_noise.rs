@@ -6,7 +6,7 @@
 use linesman_config::fault::FaultName;
 use linesman_proto::time::{Instant, Span};
 
-use super::source::{HITS, ListedChanges, flip, frame_hit, spread};
+use super::source::{HITS, ListedChanges, flip, frame_hit, frame_hits, spread};
 use super::{Kind, Parameter, PlaceRule, Shape};
 use crate::seed::Stream;
 use crate::wire::{Change, DirectedLink, Source};
@@ -44,6 +44,9 @@ pub(super) const KIND: Kind = Kind {
         if let Some(count) = start.values.whole(HITS.key) {
             let rhythm = (burst, bursts_per_s);
             let directions = &start.target.directions;
+            if let Some(mut hits) = start.hits.clone() {
+                return Ok(frame_hits(count, start.interval(), directions, &mut hits));
+            }
             let hits = in_bursts(count, start.interval(), rhythm, directions, &mut stream);
             let hits =
                 hits.into_iter().map(|(at, direction)| (at, frame_hit(direction, &mut stream)));

@@ -182,6 +182,8 @@ struct ChangesSource<'a> {
     target: Target,
     values: Values,
     stream: Stream,
+    /// Chance by which a number of hits falls on moments and bytes, where that is not `stream`.
+    hits: Option<Stream>,
 }
 
 impl ChangesSource<'_> {
@@ -216,14 +218,16 @@ pub(crate) struct FaultTemplate {
     seed: Seed,
     /// Name of its streams of chance.
     stream: String,
+    /// Name of those of a number of hits, where they have their own.
+    hits: Option<String>,
 }
 
 impl FaultTemplate {
     /// Its changes when it comes for the `nth` time, from 0.
     fn source(&self, nth: u32, window: Window) -> Result<Box<dyn Source>, FaultError> {
-        let stream = match nth {
-            0 => self.seed.stream(&self.stream),
-            nth => self.seed.stream(&format!("{} time {nth}", self.stream)),
+        let of_time = |name: &String| match nth {
+            0 => self.seed.stream(name),
+            nth => self.seed.stream(&format!("{name} time {nth}")),
         };
         (self.kind.start)(ChangesSource {
             label: &self.label,
@@ -232,7 +236,8 @@ impl FaultTemplate {
             to: window.to,
             target: self.target.clone(),
             values: self.values.clone(),
-            stream,
+            stream: of_time(&self.stream),
+            hits: self.hits.as_ref().map(of_time),
         })
     }
 }
@@ -254,14 +259,14 @@ impl Planned {
 }
 
 /// Works out what an entry means here. It begins at its own time, but not before `earliest`; its
-/// chance is that of `seed` under the name `stream`.
+/// chance is that of `seed` under the name `stream`; that of a number of hits may have a name of its own.
 pub(crate) fn plan(
     label: &str,
     entry: &FaultEntry,
     context: &FaultContext<'_>,
     earliest: Instant,
     seed: Seed,
-    stream: &str,
+    (stream, hits): (&str, Option<&str>),
 ) -> Result<Planned, FaultError> {
     let kind = known_kind(label, entry)?;
     let target = place::resolve(label, kind, entry, context)?;
@@ -277,7 +282,8 @@ pub(crate) fn plan(
     let windows = schedule::windows(label, entry, &schedule, earliest, times)?;
     let (places, name) = (target.places.clone(), kind.name);
     let (label, stream) = (label.to_owned(), stream.to_owned());
-    let template = FaultTemplate { label, kind, target, values, seed, stream };
+    let hits = hits.map(str::to_owned);
+    let template = FaultTemplate { label, kind, target, values, seed, stream, hits };
     let source = template.source(0, windows.first())?;
     Ok(Planned { name, places, template, windows, source })
 }

@@ -28,9 +28,10 @@ pub(super) const PORT_CIRCUIT: &[Parameter] = &[
 /// Damage that always acts, whatever is moved or switched: `hits` spoiled frames if so many were
 /// asked for, else `hits_per_s` destroyed symbols.
 pub(super) fn steady(start: &ChangesSource<'_>, directions: Vec<DirectedLink>) -> Box<dyn Source> {
-    let mut stream = start.stream.clone();
+    let stream = start.stream.clone();
     if let Some(count) = start.values.whole(HITS.key) {
-        return frame_hits(count, start.interval(), &directions, &mut stream);
+        let hits = &mut start.hits.clone().unwrap_or(stream);
+        return frame_hits(count, start.interval(), &directions, hits);
     }
     let rate = start.number("hits_per_s");
     Box::new(PoissonErrors::new(directions, rate, Envelope::Constant, start.from, stream))

@@ -282,7 +282,7 @@ fn schedule(
     label: &str,
     entry: &segment_file::FaultEntry,
 ) -> Result<(), BuildError> {
-    let id = segment.schedule(label, entry, Instant::ZERO)?;
+    let id = segment.schedule(label, entry, Instant::ZERO, None)?;
     let effect = if fault::missing_device(entry).is_some() {
         Effect::MissingDevice
     } else if fault::replacement(label, entry)?.is_some() {

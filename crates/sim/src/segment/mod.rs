@@ -12,6 +12,7 @@ pub(crate) mod card;
 mod ethernet;
 mod from_controllers;
 mod identification;
+mod injection;
 pub mod plug;
 mod port_swap;
 mod signal_wires;
@@ -37,10 +38,9 @@ pub use tx_capture::Outgoing;
 use crate::controller::{Controller, WatchdogKind};
 use crate::device::{SignalId, Signals};
 use crate::event_queue::EventQueue;
-use crate::fault::{self, FaultError};
 use crate::frame::{Damage, WireFrame};
 use crate::seed::Seed;
-use crate::segment_file::{FaultEntry, SegmentFile, Supply};
+use crate::segment_file::{SegmentFile, Supply};
 use crate::truth::{self, AuditedCounter, Effect, FaultId, Place, TruthLog, Unexplained};
 use crate::wire::walk::{FrameInTransit, Outcome};
 use crate::wire::world::World;
@@ -270,59 +270,6 @@ impl Segment {
     #[must_use]
     pub fn frames_without_walk(&self) -> u64 {
         self.world.fast_path.frames
-    }
-
-    // ---- faults ----
-
-    /// Injects a fault. It begins at its `from_ms`, or just after `now`: behind all that has been
-    /// worked out already, some 0.1 ms.
-    ///
-    /// # Errors
-    /// [`FaultError`] names the key that cannot be, and what can.
-    pub fn inject(&mut self, now: Instant, entry: &FaultEntry) -> Result<FaultId, FaultError> {
-        self.now = self.now.max(now);
-        let earliest = self.now.max(self.world.horizon) + Span::ns(1);
-        let label = format!("fault {}", self.world.truth.faults().len() + 1);
-        if entry.kind.parse().ok().and_then(fault::kind).is_some_and(fault::Kind::is_built_in) {
-            return Err(FaultError::BuiltIn { entry: label, kind: entry.kind.clone() });
-        }
-        self.schedule(&label, entry, earliest)
-    }
-
-    fn schedule(
-        &mut self,
-        label: &str,
-        entry: &FaultEntry,
-        earliest: Instant,
-    ) -> Result<FaultId, FaultError> {
-        let context = fault::FaultContext {
-            names: &self.names,
-            nodes: &self.nodes,
-            tree: &self.tree,
-            world: &self.world,
-            ebus_ma: &self.ebus_ma,
-            fed_anew: &self.fed_anew,
-            groups: &self.groups,
-            supplies: &self.supplies,
-        };
-        let number = self.world.truth.faults().len();
-        let stream = format!("fault {number} {}", entry.kind);
-        let planned = fault::plan(label, entry, &context, earliest, self.seed, &stream)?;
-        let id = self.world.truth.declare(planned.name, planned.places.clone());
-        self.world.running.push(planned.run(id));
-        Ok(id)
-    }
-
-    /// Ends a fault: just after `now`, behind all that has been worked out already. Of a fault that is
-    /// over, hits that still wait for a frame do not come any more; one that is built in stays.
-    pub fn heal(&mut self, now: Instant, fault: FaultId) {
-        self.now = self.now.max(now);
-        let at = self.now.max(self.world.horizon) + Span::ns(1);
-        if let Some(running) = self.world.running.iter_mut().find(|running| running.id == fault) {
-            running.heal_at(at);
-        } else {
-            self.world.disarm(fault);
-        }
     }
 
     // ---- what there is ----
