@@ -24,6 +24,19 @@ impl Lab {
         Ok(self.line.segment_mut().inject(now, entry)?)
     }
 
+    /// Puts a fault on the line whose hits fall on moments and bytes by the chance with this name.
+    ///
+    /// # Errors
+    /// As of [`Self::inject`].
+    pub fn inject_with_hits(
+        &mut self,
+        entry: &FaultEntry,
+        hits: &str,
+    ) -> Result<FaultId, LabError> {
+        let now = self.now();
+        Ok(self.line.segment_mut().inject_with_hits(now, entry, Some(hits))?)
+    }
+
     /// A fault of the run as a verdict is held against it; `None` if there is no such fault.
     #[must_use]
     pub fn truth_of(&self, id: FaultId) -> Option<Truth> {

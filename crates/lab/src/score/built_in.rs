@@ -14,6 +14,7 @@ use crate::choice::LineOutline;
 use crate::lab::LabError;
 
 /// Why a case ends early.
+#[derive(Debug)]
 pub(super) enum EarlyEnd {
     /// This plant has no place for the faults.
     NoPlace,

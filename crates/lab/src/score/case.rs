@@ -33,6 +33,8 @@ pub struct ScoreOptions {
     pub habit: Habit,
     /// True if the parts that are blamed are exchanged one after the other, with a look again after each.
     pub tries_repairs: bool,
+    /// True if a case that a set made right is played again with the cause that was named.
+    pub proves_sets: bool,
     /// Whether what listeners heard is kept.
     pub keeps_heard: bool,
     /// True if plants and diagnoses are kept.

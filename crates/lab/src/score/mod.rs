@@ -2,7 +2,8 @@
 //!
 //! A seed gives a [`case`]: a plant, its features, and faults of the whole catalogue with wide
 //! parameters ([`draw`]). [`play`] runs it, live and as a recording, [`judge`] holds what was said
-//! against the truth log, [`repair_trial`] exchanges what was blamed, [`report`] adds up. [`disturb`] does to a healthy line what is no fault,
+//! against the truth log, [`repair_trial`] exchanges what was blamed, [`set_trial`] plays the cause that was
+//! named where no evidence could tell it from the drawn one, [`report`] adds up. [`disturb`] does to a healthy line what is no fault,
 //! [`perturb`] makes a plant other than the diagnosis expects, [`listen`] judges by what is heard beside a MainDevice
 //! with other habits. A case counts when the truth log shows an effect,
 //! whether or not the diagnosis saw it.
@@ -26,6 +27,7 @@ pub mod rate;
 mod recorder;
 pub mod repair_trial;
 pub mod report;
+pub mod set_trial;
 mod sharing;
 pub mod tally;
 mod trace;

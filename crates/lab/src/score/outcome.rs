@@ -11,6 +11,7 @@ use super::judge::{Accusations, Judged};
 use super::listen::{HealthyListened, Heard, Listeners};
 use super::parts::span_ns;
 use super::repair_trial::RepairTrial;
+use super::set_trial::SetTrial;
 use super::unplayable::Unplayable;
 
 /// Outcome of one seed.
@@ -88,6 +89,8 @@ pub struct FaultOutcome {
     pub listened: Option<Listeners>,
     /// Outcome of the exchanges that were tried; of single faults for which the live diagnosis had an answer.
     pub repair: Option<RepairTrial>,
+    /// Whether the cause that was named leaves the same frames, where a set made the answer right and that was tried.
+    pub set_trial: Option<SetTrial>,
 }
 
 impl CaseReport {

@@ -27,6 +27,7 @@ use super::outcome::{CaseReport, FaultOutcome};
 use super::plant_extras::add_group;
 use super::recorder::{SharedRecording, take_down, take_down_host};
 use super::repair_trial::{RepairTrial, try_repairs};
+use super::set_trial::{put_in_instead, set_trial};
 use super::unplayable::Unplayable;
 use crate::choice::{LineOutline, are_apart, is_behind, text};
 use crate::habit::Habit;
@@ -118,7 +119,7 @@ fn empty(case: &Case, devices: usize) -> CaseReport {
 
 /// A fault that was put in.
 pub(super) struct Active {
-    id: FaultId,
+    pub(super) id: FaultId,
     pub(super) drawn: Drawn,
     until: Instant,
 }
@@ -132,7 +133,7 @@ pub(super) struct First {
 
 pub(super) struct Play<'a> {
     pub(super) case: &'a Case,
-    options: &'a ScoreOptions,
+    pub(super) options: &'a ScoreOptions,
     stream: Stream,
     pub(super) lab: Lab,
     /// What listeners hear, beside a MainDevice with the habits of others.
@@ -149,6 +150,8 @@ pub(super) struct Play<'a> {
     beside: usize,
     /// The method of a course.
     course: CourseMethod,
+    /// What is put in instead of the drawn fault.
+    pub(super) instead: Option<Vec<FaultEntry>>,
 }
 
 impl<'a> Play<'a> {
@@ -218,6 +221,7 @@ impl<'a> Play<'a> {
             has_project,
             beside: 0,
             course: CourseMethod::default(),
+            instead: None,
         })
     }
 
@@ -235,7 +239,7 @@ impl<'a> Play<'a> {
         Ok(play)
     }
 
-    fn run_all(&mut self) -> Result<CaseReport, EarlyEnd> {
+    pub(super) fn run_all(&mut self) -> Result<CaseReport, EarlyEnd> {
         let mut report = empty(self.case, self.lab.tree().len());
         report.has_group = !self.lab.project().groups.is_empty();
         report.project = self.options.keeps_heard.then(|| self.lab.project().to_toml());
@@ -292,6 +296,11 @@ impl<'a> Play<'a> {
         {
             fault.repair = self.trial(one, fault, &diagnosis);
         }
+        if let ([one], [fault]) = (active.as_slice(), report.faults.as_mut_slice())
+            && self.options.proves_sets
+        {
+            fault.set_trial = set_trial(self, one, fault, &diagnosis);
+        }
         self.keep_reports(&mut report, diagnosis, recorded);
         if let (true, Some(first)) = (self.options.keeps_heard, active.first()) {
             report.heard = self.heard(self.lab.truth().fault(first.id));
@@ -310,6 +319,13 @@ impl<'a> Play<'a> {
         let truth = self.truth(active)?;
         let first_look = (diagnosis, live.finding.as_str());
         Some(try_repairs(self.case, self.options, &truth, self.lab.tree(), first_look))
+    }
+
+    /// Names of the SubDevices, and which links are cables.
+    pub(super) fn names_and_cables(&self) -> (Vec<String>, Vec<bool>) {
+        let segment = self.lab.segment();
+        let names = segment.devices().map(|id| segment.name(id).to_owned()).collect();
+        (names, cabled(segment))
     }
 
     /// The live diagnosis at the end.
@@ -364,8 +380,12 @@ impl<'a> Play<'a> {
                 let ms = |at: Instant| at.as_nanos() as f64 / 1e6;
                 entry = entry.from_to(ms(from), Some(ms(until)));
             }
+            let id = match self.instead.take() {
+                None => self.lab.inject(&entry),
+                Some(entries) => put_in_instead(&mut self.lab, &entries),
+            };
             // What chance has put together wrongly is no case.
-            let id = self.lab.inject(&entry).map_err(|_| EarlyEnd::NoPlace)?;
+            let id = id.map_err(|_| EarlyEnd::NoPlace)?;
             active.push(Active { id, drawn: one, until });
         }
         Ok(())
@@ -404,10 +424,9 @@ impl<'a> Play<'a> {
     /// Errors that are too rare to matter, on a cable that has none of the faults.
     fn add_background(&mut self, drawn: &[Drawn]) -> Result<(), EarlyEnd> {
         let Some(rate) = self.case.background else { return Ok(()) };
-        let segment = self.lab.segment();
-        let cabled = cabled(segment);
-        let names: Vec<String> = segment.devices().map(|id| segment.name(id).to_owned()).collect();
-        let outline = LineOutline { tree: segment.tree(), names: &names, cabled: &cabled };
+        let (names, cabled) = self.names_and_cables();
+        let tree = self.lab.segment().tree();
+        let outline = LineOutline { tree, names: &names, cabled: &cabled };
         let choice = outline.choose(FaultName::CableDegraded, &mut self.stream);
         let Some(choice) = choice else { return Ok(()) };
         if drawn.iter().any(|one| one.choice.link == choice.link) {
@@ -420,10 +439,9 @@ impl<'a> Play<'a> {
     }
 
     fn draw(&mut self, name: FaultName, others: &[Drawn]) -> Result<Drawn, EarlyEnd> {
-        let segment = self.lab.segment();
-        let names: Vec<String> = segment.devices().map(|id| segment.name(id).to_owned()).collect();
-        let cabled = cabled(segment);
-        let outline = LineOutline { tree: segment.tree(), names: &names, cabled: &cabled };
+        let (names, cabled) = self.names_and_cables();
+        let tree = self.lab.segment().tree();
+        let outline = LineOutline { tree, names: &names, cabled: &cabled };
         let plan = self.lab.plan();
         let clocked: Vec<DeviceId> = plan
             .into_iter()
@@ -638,6 +656,7 @@ impl<'a> Play<'a> {
             is_pause,
             listened,
             repair: None,
+            set_trial: None,
         })
     }
 }

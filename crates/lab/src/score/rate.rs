@@ -45,6 +45,17 @@ pub fn rounded(share: f64) -> f64 {
     (share * 10_000.0).round() / 10_000.0
 }
 
+/// Rate in a thousand hours.
+pub(super) fn per_1000_hours(count: f64, hours: f64) -> Option<f64> {
+    (hours > 0.0).then(|| rounded(count * 1_000.0 / hours))
+}
+
+/// Upper end of the 95 % interval of a number that is counted (Poisson, one-sided), by the approximation of Byar.
+pub(super) fn at_most(count: u64) -> f64 {
+    let n = count as f64 + 1.0;
+    n * (1.0 - 1.0 / (9.0 * n) + 1.645 / (3.0 * n.sqrt())).powi(3)
+}
+
 /// Counts towards a rate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Count {

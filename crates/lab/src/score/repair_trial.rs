@@ -38,9 +38,7 @@ pub(super) fn try_repairs(
     let mut tried: Vec<RepairedPart> = Vec::new();
     let mut exchanges: Vec<PartExchange> = Vec::new();
     let (diagnosis, name) = first_look;
-    let all =
-        diagnosis.findings.iter().flat_map(|one| std::iter::once(one).chain(&one.consequences));
-    let mut finding = { all }.find(|finding| finding.id == name).cloned();
+    let mut finding = finding_named(diagnosis, name).cloned();
     let mut diagnosis = diagnosis.clone();
     for number in 1..=MOST_EXCHANGES {
         let next = finding.as_ref().and_then(|finding| next_part(finding, &tried));
@@ -67,6 +65,13 @@ pub(super) fn try_repairs(
         };
     }
     RepairTrial { mended_by: None }
+}
+
+/// The finding with a name, be it beneath another.
+pub(super) fn finding_named<'d>(diagnosis: &'d Diagnosis, name: &str) -> Option<&'d FindingReport> {
+    let findings = diagnosis.findings.iter();
+    let mut all = findings.flat_map(|one| std::iter::once(one).chain(&one.consequences));
+    all.find(|finding| finding.id == name)
 }
 
 /// The first part that a finding blames and that was not exchanged yet, by its causes in their order.

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::listen::report::ListenedReport;
 use super::rate::Rate;
+use super::set_trial::{SetOutcome, SetTrial};
 
 /// Name and version of the format.
 pub const SCHEMA: &str = "linesman.score/2";
@@ -85,6 +86,9 @@ pub struct ScoreReport {
     /// Listeners beside a MainDevice with the habits of others; with `own` there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub listened: Option<ListenedReport>,
+    /// Sets that made answers right, played again with the causes that were named; none where that was not tried.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub sets: BTreeMap<String, SetReport>,
     /// Seeds that could not be played, and why.
     pub unplayable: Vec<String>,
     /// Cases that were judged wrongly, or with findings that nothing explains; at most 2,000.
@@ -248,6 +252,30 @@ pub struct Bin {
     pub confidence: f64,
     /// How often they were right.
     pub right: Rate,
+}
+
+/// Single cases that one set made right: whether the cause that was named leaves the same frames and observations as the
+/// one that was drawn.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SetReport {
+    /// It does.
+    pub same: u64,
+    /// It does not, with the seed, both causes and the first difference.
+    pub parted: Vec<String>,
+    /// It could not be played, with the seed, both causes and why.
+    pub not_tried: Vec<String>,
+}
+
+impl SetReport {
+    pub(super) fn add(&mut self, seed: u64, drawn: FaultName, trial: &SetTrial) {
+        let text = |what: &str| format!("seed {seed}: {drawn} named {}: {what}", trial.cause);
+        match &trial.outcome {
+            SetOutcome::Same(_) => self.same += 1,
+            SetOutcome::Parted(difference) => self.parted.push(text(difference)),
+            SetOutcome::NotTried(why) => self.not_tried.push(text(why)),
+        }
+    }
 }
 
 /// A case that was judged wrongly.

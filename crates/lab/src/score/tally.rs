@@ -9,11 +9,11 @@ use super::case::{CaseKind, ScoreOptions};
 use super::judge::{Accusations, Judged};
 use super::listen::tally::ListenTally;
 use super::outcome::{CaseReport, FaultOutcome};
-use super::rate::{Count, rounded};
+use super::rate::{Count, at_most, per_1000_hours, rounded};
 use super::repair_trial::MOST_EXCHANGES;
 use super::report::{
     Baseline, Bin, Bucket, DoubleReport, GroupReport, HealthyReport, LeftOut, PairRates,
-    RepairReport, SCHEMA, ScoreReport, SideReport, WrongReport,
+    RepairReport, SCHEMA, ScoreReport, SetReport, SideReport, WrongReport,
 };
 use super::unplayable::Unplayable;
 use crate::habit::Habit;
@@ -199,6 +199,7 @@ pub struct Tally {
     confidence: [Confidence; BINS],
     fast: BTreeMap<FaultName, Count>,
     listened: ListenTally,
+    sets: BTreeMap<String, SetReport>,
     wrong: Vec<WrongReport>,
 }
 
@@ -289,6 +290,9 @@ impl Tally {
     fn add_single(&mut self, case: &CaseReport, fault: &FaultOutcome) {
         self.single.add(fault);
         self.listened.add(case, fault);
+        if let Some(trial) = &fault.set_trial {
+            self.sets.entry(trial.set.clone()).or_default().add(case.seed, fault.name, trial);
+        }
         if case.kind == CaseKind::Masked {
             self.masked.add(fault);
         }
@@ -433,21 +437,11 @@ impl Tally {
                 .map(|(name, group)| (name.name().to_owned(), group.report()))
                 .collect(),
             listened: (self.options.habit != Habit::Own).then(|| self.listened.report()),
+            sets: self.sets.clone(),
             unplayable: self.unplayable.clone(),
             wrong: self.wrong.clone(),
         }
     }
-}
-
-/// Rate in a thousand hours.
-fn per_1000_hours(count: f64, hours: f64) -> Option<f64> {
-    (hours > 0.0).then(|| rounded(count * 1_000.0 / hours))
-}
-
-/// Upper end of the 95 % interval of a number that is counted (Poisson, one-sided), by the approximation of Byar.
-fn at_most(count: u64) -> f64 {
-    let n = count as f64 + 1.0;
-    n * (1.0 - 1.0 / (9.0 * n) + 1.645 / (3.0 * n.sqrt())).powi(3)
 }
 
 /// The expected calibration error: how far share and confidence are apart in each bin, weighted by

@@ -69,6 +69,12 @@ impl Truth {
         self.hops.contains(&(one, other)) && self.hops.contains(&(other, one))
     }
 
+    /// Whether anything but the link between two ends was hit.
+    fn hits_beyond(&self, one: End<DeviceId>, other: End<DeviceId>) -> bool {
+        let is_there = |hop: &Hop| *hop == (one, other) || *hop == (other, one);
+        !self.hops.iter().all(is_there)
+    }
+
     /// Devices that it sits in.
     fn devices(&self) -> impl Iterator<Item = DeviceId> {
         self.places.iter().filter_map(|place| match place {
@@ -153,7 +159,8 @@ impl List<'_> {
                     LinkOpen => self.open(truth, one, other),
                     FalseLink => self.one_end(truth, one, other),
                     CableDegraded | EmcNoise if truth.hit_both_ways(one, other) => {
-                        for cause in sets::BOTH_WAYS.causes {
+                        let causes = sets::BOTH_WAYS.causes;
+                        for cause in causes.iter().filter(|_| !truth.hits_beyond(one, other)) {
                             self.add(*cause, Site::link(tree, one, other), &sets::BOTH_WAYS);
                         }
                     }
@@ -248,9 +255,10 @@ impl List<'_> {
         self.on_hop(truth, (from, to), set);
     }
 
-    /// All causes of a set on a hop, each at the places where it sits, if the fault is one of them.
+    /// All causes of a set on a hop, each at the places where it sits, if the fault is one of them. What hit other links
+    /// alike is not in this one: then none but interference explains all hits.
     fn on_hop(&mut self, truth: &Truth, (from, to): Hop, set: &'static AdmittedSet) {
-        if !set.has(truth.name) {
+        if !set.has(truth.name) || truth.hits_beyond(from, to) {
             return;
         }
         let hop = Site::hop(self.scene.tree, from, to);

@@ -20,6 +20,8 @@ pub use site::{Site, Way};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use sets::AdmittedSet;
+
 /// How well a claim fits.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
 #[serde(into = "String")]
@@ -38,6 +40,15 @@ impl Grade {
     pub fn is_right(self) -> bool {
         self != Self::Wrong
     }
+
+    /// The set that admits it, if it is one that does.
+    #[must_use]
+    pub fn set(self) -> Option<&'static AdmittedSet> {
+        match self {
+            Self::Admitted(why) => sets::ALL.iter().copied().find(|set| set.why == why),
+            Self::Wrong | Self::Exact => None,
+        }
+    }
 }
 
 /// `wrong`, `exact`, or the name of the set.
@@ -46,10 +57,7 @@ impl From<Grade> for String {
         match grade {
             Grade::Wrong => "wrong".to_owned(),
             Grade::Exact => "exact".to_owned(),
-            Grade::Admitted(why) => {
-                let set = sets::ALL.iter().find(|set| set.why == why);
-                set.map_or(why, |set| set.name).to_owned()
-            }
+            Grade::Admitted(why) => grade.set().map_or(why, |set| set.name).to_owned(),
         }
     }
 }

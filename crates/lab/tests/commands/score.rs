@@ -1,6 +1,9 @@
 //! A slice of the score: floors below which the diagnosis must not fall, and that it can be measured again.
 
+use std::collections::BTreeMap;
+
 use linesman_config::fault::FaultName;
+use linesman_lab::score::set_trial::SetOutcome;
 use linesman_lab::score::{Perturbation, ScoreOptions, Tally, run_case};
 
 #[test]
@@ -122,4 +125,27 @@ fn a_perturbed_plant_is_judged_like_any_other() {
         assert_eq!(report.perturbed.as_deref(), Some(perturb.name()));
         assert!(report.effective_cases >= 3, "{perturb}: {:?}", report.unplayable);
     }
+}
+
+#[test]
+fn a_cause_that_a_set_admits_leaves_the_same_frames_on_drawn_lines() {
+    let mut tried = BTreeMap::new();
+    for fault in [
+        FaultName::DeviceOff,
+        FaultName::EbusOverload,
+        FaultName::NicDamaged,
+        FaultName::ReceiverDamaged,
+    ] {
+        let options =
+            ScoreOptions { fault: Some(fault), proves_sets: true, ..ScoreOptions::default() };
+        for seed in 1..7 {
+            let case = run_case(seed, &options);
+            for trial in case.faults.iter().filter_map(|fault| fault.set_trial.as_ref()) {
+                let is_same = matches!(trial.outcome, SetOutcome::Same(1_000..));
+                assert!(is_same, "{}: {trial:?}", case.replay());
+                *tried.entry(trial.set.clone()).or_insert(0) += 1;
+            }
+        }
+    }
+    assert!(tried.values().sum::<u32>() > 8 && tried.len() > 2, "{tried:?}");
 }
