@@ -58,6 +58,9 @@ pub(crate) struct Arguments {
     /// looked at again
     #[arg(long)]
     no_repairs: bool,
+    /// Play each case that a set of causes made right again with the cause that was named, and compare all frames
+    #[arg(long)]
+    prove_sets: bool,
     /// Write each case to this new file, schema linesman.score-part/1, for `lab merge`
     #[arg(long, value_name = "FILE.json")]
     part: Option<PathBuf>,
@@ -95,6 +98,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         perturb: arguments.perturb,
         habit: arguments.habit,
         tries_repairs: !arguments.no_repairs,
+        proves_sets: arguments.prove_sets,
         keeps_heard: arguments.record.is_some(),
         keeps_reports: arguments.reports.is_some(),
     };

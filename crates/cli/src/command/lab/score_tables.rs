@@ -23,6 +23,7 @@ pub(super) fn show(report: &ScoreReport, list: bool, output: &mut Output) {
     }
     output.line("");
     singles(report, output);
+    sets(report, list, output);
     output.line("");
     healthy(report, output);
     doubles(report, output);
@@ -88,6 +89,25 @@ fn singles(report: &ScoreReport, output: &mut Output) {
             share(tried.by_second),
             share(tried.by_third),
         ));
+    }
+}
+
+/// Sets that made answers right, and whether the causes that were named leave the same frames.
+fn sets(report: &ScoreReport, list: bool, output: &mut Output) {
+    if report.sets.is_empty() {
+        return;
+    }
+    let mut table = Table::new(&["set", "same frames", "parted", "not tried"], output.paint());
+    for (name, set) in &report.sets {
+        let [parted, not_tried] = [&set.parted, &set.not_tried].map(|all| all.len().to_string());
+        table.row([name.clone(), set.same.to_string(), parted, not_tried]);
+    }
+    output.line("");
+    output.text(&table.render());
+    if list {
+        for line in report.sets.values().flat_map(|set| set.parted.iter().chain(&set.not_tried)) {
+            output.line(&format!("  {line}"));
+        }
     }
 }
 
