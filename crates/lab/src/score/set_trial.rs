@@ -293,6 +293,9 @@ fn hits(judged: &JudgedCase<'_>, claim: Claim) -> Option<Vec<(Hop, Vec<Instant>)
             }
             (_, _) => continue,
         };
+        if !judged.truth.sits_on(hop) {
+            continue;
+        }
         match hops.iter_mut().find(|(known, _)| *known == hop) {
             Some((_, moments)) => moments.push(at),
             None => hops.push((hop, vec![at])),
@@ -412,8 +415,9 @@ mod tests {
         play.wait(&mut active).ok()?;
         let truth = play.truth(&active[0])?;
         let link = |(from, to): &Hop| Site::link(play.lab.tree(), *from, *to);
-        let first = link(truth.hops.first()?);
-        truth.hops.iter().find(|hop| link(hop) != first)?;
+        let mut hit = truth.hops.iter().filter(|hop| truth.sits_on(**hop));
+        let first = link(hit.next()?);
+        hit.find(|hop| link(hop) != first)?;
         let claim = Claim { cause, site: first };
         let set = &sets::BOTH_WAYS;
         with_other_cause(&play, &active[0], set, claim).map(|trial| trial.outcome)

@@ -69,10 +69,23 @@ impl Truth {
         self.hops.contains(&(one, other)) && self.hops.contains(&(other, one))
     }
 
-    /// Whether anything but the link between two ends was hit.
+    /// Whether the fault itself sits on a direction of a link. Frames that it has spoiled may make symbol errors elsewhere.
+    #[must_use]
+    pub fn sits_on(&self, (from, to): Hop) -> bool {
+        self.places.iter().any(|place| match *place {
+            TruthPlace::Hop(one, other) => (one, other) == (from, to),
+            TruthPlace::Link(one, other) => {
+                (one, other) == (from, to) || (other, one) == (from, to)
+            }
+            TruthPlace::Device(id) => [from, to].iter().any(|end| end.node() == Some(id)),
+            TruthPlace::Host(path) => [from, to].contains(&End::MainDevice(path)),
+        })
+    }
+
+    /// Whether it has hit another link than that between two ends.
     fn hits_beyond(&self, one: End<DeviceId>, other: End<DeviceId>) -> bool {
         let is_there = |hop: &Hop| *hop == (one, other) || *hop == (other, one);
-        !self.hops.iter().all(is_there)
+        self.hops.iter().any(|hop| !is_there(hop) && self.sits_on(*hop))
     }
 
     /// Devices that it sits in.
@@ -439,6 +452,21 @@ mod tests {
         assert!(matches!(cable, Grade::Admitted(_)));
         assert_eq!(grade(&noise, true, DeviceInternal, site(Some(Way::BToA))), Grade::Wrong);
         assert_eq!(grade(&noise, true, NicDamaged, Site::Host), Grade::Wrong);
+    }
+
+    #[test]
+    fn interference_in_two_cables_is_no_worn_cable() {
+        let places = [(end(0, C), end(3, A)), (End::MainDevice(Path::A), end(0, A))];
+        let mut noise = Truth::new(EmcNoise, places.map(|(a, b)| TruthPlace::Link(a, b)).into());
+        let link = Site::Link { a: end(0, C), b: Some(end(3, A)), way: None };
+        noise.hops = vec![places[0]];
+        assert!(grade(&noise, true, CableDegraded, link).is_right(), "one of them was hit");
+        // Damaged frames make symbol errors further on.
+        noise.hops.push((end(0, B), end(1, A)));
+        assert!(grade(&noise, true, CableDegraded, link).is_right());
+        noise.hops.push(places[1]);
+        assert!(!grade(&noise, true, CableDegraded, link).is_right());
+        assert_eq!(grade(&noise, true, EmcNoise, link), Grade::Exact);
     }
 
     #[test]
