@@ -53,14 +53,20 @@ fn late_us(entry: &FaultEntry) -> Option<f64> {
 }
 
 /// True if a fault did so little that a note is the right answer: it cost one frame at most, or made frames late where
-/// nobody keeps step, or by less than matters to whoever does.
-pub(super) fn is_bearable(record: &FaultRecord, entry: &FaultEntry, cycle: Option<Span>) -> bool {
+/// nobody keeps step, or by less than matters to whoever does. Symbols that nobody counts do not count here.
+pub(super) fn is_bearable(
+    lab: &Lab,
+    record: &FaultRecord,
+    entry: &FaultEntry,
+    cycle: Option<Span>,
+) -> bool {
     if matches!(record.name, FaultName::HostJitter | FaultName::LateFrames) {
         let late_us = late_us(entry).unwrap_or(f64::MAX);
         let harms = |cycle: Span| late_us * 1e3 >= cycle.as_nanos() as f64 * HARMLESS;
         return record.frames_lost == 0 && !cycle.is_some_and(harms);
     }
-    let hits = record.symbol_errors.max(record.frames_spoiled);
+    let into_card = of_fault(lab, record).filter(|one| is_symbol_into_card(*one)).count() as u64;
+    let hits = record.symbol_errors.saturating_sub(into_card).max(record.frames_spoiled);
     let frames = hits.max(record.frames_lost).max(record.frames_delayed);
     frames <= 1 && record.links_lost == 0 && record.supplies_lost == 0
 }
@@ -75,21 +81,11 @@ fn is_traceless(lab: &Lab, record: &FaultRecord) -> bool {
     if record.frames_spoiled + record.frames_lost > 0 {
         return false;
     }
-    let mut of_fault = lab
-        .truth()
-        .entries()
-        .iter()
-        .filter_map(|entry| match entry {
-            Entry::Effect { fault: Some(id), place, effect, .. } if *id == record.id => {
-                Some((place, effect))
-            }
-            Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
-        })
-        .peekable();
+    let mut of_fault = of_fault(lab, record).peekable();
     let is_up = |id: DeviceId| !lab.not_up().any(|other| other == id);
     of_fault.peek().is_some()
         && of_fault.all(|(place, effect)| match (effect, place) {
-            (Effect::SymbolError, Place::Direction(_, End::MainDevice(_))) => true,
+            _ if is_symbol_into_card((place, effect)) => true,
             (
                 Effect::Misbehaves(
                     SoftwareFault::Mismatch(_)
@@ -100,6 +96,25 @@ fn is_traceless(lab: &Lab, record: &FaultRecord) -> bool {
             ) => record.is_active() && is_up(*id),
             (_, _) => false,
         })
+}
+
+/// What the log says of a fault.
+fn of_fault<'l>(
+    lab: &'l Lab,
+    record: &FaultRecord,
+) -> impl Iterator<Item = (&'l Place, &'l Effect)> {
+    let fault = record.id;
+    lab.truth().entries().iter().filter_map(move |entry| match entry {
+        Entry::Effect { fault: Some(id), place, effect, .. } if *id == fault => {
+            Some((place, effect))
+        }
+        Entry::Effect { .. } | Entry::Begin { .. } | Entry::End { .. } => None,
+    })
+}
+
+/// A symbol that is hit on the way into a card: no card counts it.
+fn is_symbol_into_card((place, effect): (&Place, &Effect)) -> bool {
+    matches!((effect, place), (Effect::SymbolError, Place::Direction(_, End::MainDevice(_))))
 }
 
 #[cfg(test)]
@@ -131,8 +146,10 @@ mod tests {
             "between frames: {record:?}"
         );
         assert_eq!(effects(&lab, &record), 0, "no card counts them");
+        assert!(is_bearable(&lab, &record, &card("receiver"), None));
         let (lab, record) = played(&card("transmitter"));
         assert_eq!(effects(&lab, &record), record.symbol_errors, "the first SubDevice does");
-        assert!(record.symbol_errors > 0);
+        assert!(record.symbol_errors > 1);
+        assert!(!is_bearable(&lab, &record, &card("transmitter"), None));
     }
 }

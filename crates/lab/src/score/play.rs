@@ -651,7 +651,12 @@ impl<'a> Play<'a> {
             live,
             capture,
             baseline: baseline.is_some_and(|site| baseline::is_right(site, &truth, tree)),
-            is_bearable: is_bearable(record, entry, self.keeps_step().then_some(self.case.cycle)),
+            is_bearable: is_bearable(
+                &self.lab,
+                record,
+                entry,
+                self.keeps_step().then_some(self.case.cycle),
+            ),
             is_unseen: truth.unseen.is_some(),
             is_pause,
             listened,
