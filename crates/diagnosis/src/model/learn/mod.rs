@@ -53,6 +53,7 @@ impl Learner {
         if self.addresses.expect_unanswered(model) | self.addresses.settle(model) {
             // What was under way was noted by the identities of before.
             self.transfers = sii::Transfers::default();
+            model.calm_state = None;
         }
     }
 
