@@ -25,7 +25,7 @@ const STILL: Span = Span::ms(500);
 #[derive(Clone, Default, Debug)]
 pub struct InputActivity {
     last: Vec<u8>,
-    /// By words of [`last`](Self::last), the last one filled up.
+    /// Changes by words of eight bytes, the last one filled up.
     words: Vec<[ByteActivity; WORD]>,
     frames: u64,
 }
