@@ -1,7 +1,7 @@
 //! One access to registers or memory, as a datagram and its return show it.
 
 use linesman_diagnosis::model::NetworkModel;
-use linesman_diagnosis::model::learn::{Answer, answers};
+use linesman_diagnosis::model::learn::{Answer, each_answer};
 use linesman_diagnosis::observe::{Exchange, FrameCopy};
 use linesman_proto::address::{
     DeviceId, LogicalAddress, Path, Position, RegisterAddress, StationAddress,
@@ -139,9 +139,11 @@ pub fn accesses<'a>(
     match (&exchange.request, &exchange.reply) {
         (request, Some(reply)) => {
             let is_further = !exchange.earlier.is_empty();
-            let all = answers(exchange, request.as_ref(), reply);
-            all.flatten()
-                .for_each(|answer| take(&DatagramAccess::answered(&answer, counted, is_further)));
+            each_answer(exchange, request.as_ref(), reply, |answer| {
+                if let Some(answer) = answer {
+                    take(&DatagramAccess::answered(answer, counted, is_further));
+                }
+            });
         }
         (Some(request), None) => lost(request, take),
         (None, None) => {}

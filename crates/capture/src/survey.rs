@@ -61,7 +61,8 @@ impl Survey {
             self.first.get_or_insert(frame.time);
             self.last = self.last.max(frame.time);
         }
-        engine.handle_frame_with(frame, &mut |model, exchange| self.exchange(model, exchange));
+        engine
+            .handle_frame_with(frame, None, &mut |model, exchange| self.exchange(model, exchange));
     }
 
     /// Takes the PDOs of a SubDevice by its device description, as they are assigned by default. They name its process

@@ -6,7 +6,7 @@ mod tap;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
-use linesman_diagnosis::observe::{Direction, FrameSeen};
+use linesman_diagnosis::observe::{Direction, Fingerprint, FrameSeen};
 use linesman_link::capture::{
     CaptureEnd, CaptureError, CaptureInterface, CaptureInterfaceId, CaptureReader, CapturedFrame,
     FrameDirection, FrameNumber, MergedCaptures, ReadAhead, RunClock, SkippedLinkType,
@@ -35,7 +35,7 @@ enum FrameSource {
     /// It is read as its frames are asked for: what comes through a pipe is shown as soon as it is there.
     Direct(Box<CaptureReader>),
     /// A thread reads ahead.
-    Ahead(ReadAhead),
+    Ahead(ReadAhead<Option<Fingerprint>>),
     /// Several files by the times of their frames.
     Merged(MergedCaptures),
 }
@@ -47,6 +47,8 @@ pub struct CaptureItem<'a> {
     pub captured: CapturedFrame<'a>,
     /// As the diagnosis sees it.
     pub seen: FrameSeen<'a>,
+    /// Its fingerprint, where it was worked out ahead.
+    pub print: Option<&'a Fingerprint>,
     /// The interface that saw it.
     pub interface: &'a CaptureInterface,
 }
@@ -180,7 +182,7 @@ impl Capture {
         if let Some(tap) = tap {
             seen.probe = tap.record(captured.interface, interface, &seen);
         }
-        Some(CaptureItem { captured, seen, interface })
+        Some(CaptureItem { captured, seen, print: source.print(), interface })
     }
 
     /// The start of the run by the capture's clock.
@@ -250,7 +252,16 @@ impl FrameSource {
         if !is_file {
             return Self::Direct(Box::new(reader));
         }
-        ReadAhead::start(reader).map_or_else(Self::Direct, Self::Ahead)
+        let print = |frame: &CapturedFrame<'_>| Fingerprint::of_frame(frame.bytes);
+        ReadAhead::start(reader, print).map_or_else(Self::Direct, Self::Ahead)
+    }
+
+    #[inline]
+    fn print(&self) -> Option<&Fingerprint> {
+        match self {
+            Self::Ahead(reader) => reader.prepared()?.as_ref(),
+            Self::Direct(_) | Self::Merged(_) => None,
+        }
     }
 
     #[inline]

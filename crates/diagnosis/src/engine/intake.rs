@@ -14,10 +14,11 @@ use crate::observe::{
 pub(super) fn take_copy(
     watched: &mut NetworkWatch,
     frame: &FrameSeen<'_>,
+    print: Option<&Fingerprint>,
     now: Instant,
     observe: &mut impl FnMut(&NetworkModel, &Exchange<'_>),
 ) {
-    let Some(record) = frame.probe else { return take(watched, frame, now, observe) };
+    let Some(record) = frame.probe else { return take(watched, frame, print, now, observe) };
     let mut probe = std::mem::take(&mut watched.capture_probe);
     probe.take(frame, record, &mut |output| take_output(watched, output, now, observe));
     watched.capture_probe = probe;
@@ -43,7 +44,7 @@ fn take_output(
 ) {
     match output {
         ProbeOutput::Frame(seen) => {
-            take(watched, &seen, now, observe);
+            take(watched, &seen, None, now, observe);
         }
         ProbeOutput::Passed(passage, expected, order) => {
             if watched.model.capture_probe.note(passage, expected, order) {
@@ -57,6 +58,7 @@ fn take_output(
 pub(super) fn take(
     watched: &mut NetworkWatch,
     frame: &FrameSeen<'_>,
+    print: Option<&Fingerprint>,
     now: Instant,
     observe: &mut impl FnMut(&NetworkModel, &Exchange<'_>),
 ) {
@@ -91,7 +93,7 @@ pub(super) fn take(
     if companion::processed(&view).is_some() {
         return;
     }
-    let print = Fingerprint::of(&view);
+    let print = print.copied().unwrap_or_else(|| Fingerprint::of(&view));
     if print.is_cut && frame.truncated {
         traffic.recording.record_cut();
     }

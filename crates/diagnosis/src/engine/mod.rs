@@ -18,7 +18,7 @@ use crate::ask::AskingReport;
 use crate::coverage::{Coverage, InputKind};
 use crate::finding::{Finding, FindingStore, Severity};
 use crate::model::{NetworkModel, search};
-use crate::observe::{Exchange, FrameSeen, HostEvent, HostObservation, Pairing};
+use crate::observe::{Exchange, Fingerprint, FrameSeen, HostEvent, HostObservation, Pairing};
 use crate::report::{
     self, Diagnosis, FindingReport, MainDeviceReport, NetworkReport, Number, Verdict,
 };
@@ -98,20 +98,21 @@ impl Engine {
 
     /// Takes a frame.
     pub fn handle_frame(&mut self, frame: &FrameSeen<'_>) {
-        self.handle_frame_with(frame, &mut |_, _| {});
+        self.handle_frame_with(frame, None, &mut |_, _| {});
     }
 
-    /// Takes a frame, and shows each exchange that it completes or settles to `observe`, with what is known of the
-    /// network then. Questions of this program are not shown.
+    /// Takes a frame, with its fingerprint where another thread has worked it out, and shows each exchange that it
+    /// completes or settles to `observe`, with what is known of the network then. Questions of this program are not shown.
     pub fn handle_frame_with(
         &mut self,
         frame: &FrameSeen<'_>,
+        print: Option<&Fingerprint>,
         observe: &mut impl FnMut(&NetworkModel, &Exchange<'_>),
     ) {
         self.now = self.now.max(frame.time);
         let now = self.now;
         let watched = self.watched(frame.network);
-        intake::take_copy(watched, frame, now, observe);
+        intake::take_copy(watched, frame, print, now, observe);
         self.background_poll();
         self.judge_if_due();
     }

@@ -53,6 +53,15 @@ pub(super) struct IndexUse {
     others: Option<u8>,
 }
 
+/// Indexes of the datagrams of a frame.
+#[derive(Clone, Copy, Default, Debug)]
+struct FrameIndexes {
+    first: Option<u8>,
+    second: Option<u8>,
+    /// True if one behind the second differs from it.
+    differ: bool,
+}
+
 /// Habits of one sender.
 #[derive(Clone, Debug)]
 pub(super) struct SenderHabits {
@@ -166,11 +175,13 @@ impl SenderHabits {
     fn take(&mut self, view: &FrameView<'_>, at: Instant, is_request: bool) {
         self.requests += 1;
         self.to_ethercat_address += u64::from(view.destination() == kind::ETHERCAT_ADDRESS);
-        self.index.take(view);
         let (mut has_configured, mut has_states) = (false, false);
+        let mut indexes = FrameIndexes::default();
         for datagram in view.datagrams().map_while(Result::ok) {
+            indexes.add(datagram.index());
             let Some(command) = datagram.command() else { continue };
-            match command.effect().addressing {
+            let effect = command.effect();
+            match effect.addressing {
                 Addressing::Logical => {
                     has_configured |= kind::CONFIGURED_ADDRESSES.contains(&datagram.logical().0);
                     continue;
@@ -180,9 +191,13 @@ impl SenderHabits {
                 Addressing::Position | Addressing::Broadcast => {}
             }
             has_states |= command == Command::Brd && datagram.ado().0 == 0x0130;
+            if effect.reads && !effect.writes {
+                self.note_reading(&datagram);
+            }
             self.note_trait(command, &datagram, is_request);
-            self.polls.take(command, &datagram, at);
+            self.polls.take(effect, &datagram, at);
         }
+        self.index.take(indexes);
         self.configured_frames += u64::from(has_configured && has_states);
     }
 
@@ -192,15 +207,21 @@ impl SenderHabits {
         }
     }
 
+    #[inline]
+    fn note_reading(&mut self, datagram: &Datagram<'_>) {
+        let ado = datagram.ado().0;
+        if ado >= TELLING_END || self.telling_read == [true; TELLING.len()] {
+            return;
+        }
+        let end = ado.saturating_add(datagram.data_len() as u16);
+        for ((register, len), read) in TELLING.iter().zip(&mut self.telling_read) {
+            *read |= ado < register.0 + len && register.0 < end;
+        }
+    }
+
+    #[inline]
     fn note_trait(&mut self, command: Command, datagram: &Datagram<'_>, is_request: bool) {
         let (ado, len) = (datagram.ado().0, datagram.data_len());
-        let effect = command.effect();
-        if effect.reads && !effect.writes && ado < TELLING_END {
-            let end = ado.saturating_add(len as u16);
-            for ((register, len), read) in TELLING.iter().zip(&mut self.telling_read) {
-                *read |= ado < register.0 + len && register.0 < end;
-            }
-        }
         match (command, ado, len) {
             (Command::Apwr, 0x0010, 2) if is_request && self.base.is_none() => {
                 let station =
@@ -224,14 +245,23 @@ impl SenderHabits {
     }
 }
 
+impl FrameIndexes {
+    #[inline]
+    fn add(&mut self, index: u8) {
+        match (self.first, self.second) {
+            (None, _) => self.first = Some(index),
+            (Some(_), None) => self.second = Some(index),
+            (Some(_), Some(second)) => self.differ |= index != second,
+        }
+    }
+}
+
 impl IndexUse {
-    fn take(&mut self, view: &FrameView<'_>) {
-        let mut indexes = view.datagrams().map_while(Result::ok).map(|datagram| datagram.index());
-        let Some(first) = indexes.next() else { return };
-        let second = indexes.next();
+    fn take(&mut self, indexes: FrameIndexes) {
+        let Some(first) = indexes.first else { return };
+        let (second, are_equal) = (indexes.second, !indexes.differ);
         self.highest = self.highest.max(first).max(second.unwrap_or(first));
         let Some(second) = second else { return };
-        let are_equal = indexes.all(|index| index == second);
         self.several += 1;
         self.same += u64::from(are_equal && second == first);
         let is_steady = are_equal && self.others == Some(second) && self.first != first;

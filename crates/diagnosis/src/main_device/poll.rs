@@ -1,7 +1,7 @@
 //! Registers that a MainDevice reads again and again, and how often.
 
 use linesman_proto::address::RegisterAddress;
-use linesman_proto::command::{Addressing, Command};
+use linesman_proto::command::{Addressing, Effect};
 use linesman_proto::frame::Datagram;
 use linesman_proto::register::ErrorCounters;
 use linesman_proto::time::{Instant, Span};
@@ -41,8 +41,8 @@ pub enum Access {
 
 impl Access {
     /// The access of a datagram, if it is one that is watched.
-    fn of(command: Command, datagram: &Datagram<'_>) -> Option<Self> {
-        let effect = command.effect();
+    #[inline]
+    fn of(effect: Effect, datagram: &Datagram<'_>) -> Option<Self> {
         if effect.multiple_write {
             return Some(Self::Distributed);
         }
@@ -115,19 +115,22 @@ pub(super) struct Polls {
 
 impl Polls {
     /// Takes a datagram of a request that was sent at `at`.
-    pub(super) fn take(&mut self, command: Command, datagram: &Datagram<'_>, at: Instant) {
+    pub(super) fn take(&mut self, effect: Effect, datagram: &Datagram<'_>, at: Instant) {
         let (register, len) = (datagram.ado(), datagram.data_len() as u16);
         if register.0 >= FIRST_RAM || EEPROM.contains(&register.0) {
             return;
         }
-        let Some(access) = Access::of(command, datagram) else { return };
+        let Some(access) = Access::of(effect, datagram) else { return };
         // Broadcasts may come with any position, as one that passes a second card of a ring.
-        let address =
-            if command.effect().addressing == Addressing::Broadcast { 0 } else { datagram.adp() };
+        let address = if effect.addressing == Addressing::Broadcast { 0 } else { datagram.adp() };
         let is_it =
             |poll: &Poll| poll.register == register && poll.len == len && poll.access == access;
+        // Some are accessed of one SubDevice after the other, some in turns.
         if !self.all.get(self.latest).is_some_and(is_it) {
-            self.latest = self.all.iter().position(is_it).unwrap_or(self.all.len());
+            self.latest += 1;
+            if !self.all.get(self.latest).is_some_and(is_it) {
+                self.latest = self.all.iter().position(is_it).unwrap_or(self.all.len());
+            }
         }
         if let Some(poll) = self.all.get_mut(self.latest) {
             if poll.address == address && at >= poll.last {

@@ -406,6 +406,13 @@ impl AlHistory {
         self.status.is_some_and(|status| status.value.0 & 0x0F == u16::from(state.bits()))
     }
 
+    /// True if this state was read last, without the error bit, and no error stands: nothing but news changes that.
+    #[must_use]
+    pub(super) fn is_calm_in(&self, state: AlState) -> bool {
+        let has_bit = self.status.is_some_and(|status| status.value.error());
+        self.is_in(state) && !has_bit && !self.has_error()
+    }
+
     /// The state, where one was read and it names one.
     #[must_use]
     #[inline]

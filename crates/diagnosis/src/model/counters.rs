@@ -1,5 +1,7 @@
 //! Error counters of one controller over time: the first reading is history, rises count.
 
+mod standing;
+
 use std::collections::VecDeque;
 
 use linesman_proto::address::RegisterAddress;
@@ -7,6 +9,7 @@ use linesman_proto::port::Port;
 use linesman_proto::register::{ClearGroup, Difference, ErrorCounter, ErrorCounters, Total};
 use linesman_proto::time::Instant;
 
+use self::standing::StandingReading;
 use super::Seen;
 
 /// How many rises of one counter are kept; older ones are forgotten, the total stays.
@@ -32,6 +35,8 @@ pub struct CounterHistory {
     may_be_cleared: [Option<Instant>; ClearGroup::ALL.len()],
     /// When the counter that fell had been read before.
     before_cleared: Instant,
+    /// The latest reading of registers, if one like it adds nothing.
+    standing: Option<StandingReading>,
 }
 
 /// Tracks of the counters that were read, in the order of [`ErrorCounter`]. A slot for each, since they are looked up
@@ -133,7 +138,20 @@ impl CounterHistory {
         at: Instant,
         frame: Option<u64>,
     ) -> bool {
-        self.record_all(ErrorCounters::covered(data, start), at, frame)
+        if self.standing.as_ref().is_some_and(|standing| standing.is(start, data)) {
+            self.record_again(at, frame);
+            return false;
+        }
+        let news = self.record_all(ErrorCounters::covered(data, start), at, frame);
+        self.standing = self.standing_at(start, data, frame);
+        news
+    }
+
+    /// True if a reading in a frame shows what was before a write in the same frame: that takes effect when the frame has
+    /// passed and its check sequence was right.
+    #[inline]
+    fn is_old(&self, counter: ErrorCounter, frame: Option<u64>) -> bool {
+        frame.is_some() && self.cleared_in[counter.clear_group() as usize] == frame
     }
 
     /// Takes a reading of some counters. Says whether any of them rose or fell, or is new.
@@ -155,13 +173,9 @@ impl CounterHistory {
         frame: Option<u64>,
     ) -> bool {
         let mut fell = [false; ClearGroup::ALL.len()];
-        // A write takes effect when the frame has passed and its check sequence was right: readings behind it in the same
-        // frame show what was before.
-        let is_old = |history: &Self, counter: ErrorCounter| {
-            frame.is_some() && history.cleared_in[counter.clear_group() as usize] == frame
-        };
+        self.standing = None;
         for (counter, value) in reading.clone() {
-            if is_old(self, counter) {
+            if self.is_old(counter, frame) {
                 continue;
             }
             self.note_fall(counter, value.into(), &mut fell, Seen::new((), at, frame));
@@ -169,7 +183,7 @@ impl CounterHistory {
         self.clears += fell.iter().filter(|fell| **fell).count() as u32;
         let mut news = false;
         for (counter, value) in reading {
-            if is_old(self, counter) {
+            if self.is_old(counter, frame) {
                 continue;
             }
             let group = counter.clear_group() as usize;
@@ -201,6 +215,7 @@ impl CounterHistory {
         frame: Option<u64>,
     ) -> bool {
         let mut fell = [false; ClearGroup::ALL.len()];
+        self.standing = None;
         for (counter, value) in reading {
             self.note_fall(*counter, *value, &mut fell, Seen::new((), at, frame));
         }
@@ -276,6 +291,7 @@ impl CounterHistory {
     /// Notes that a write in a frame cleared a group on purpose: readings of the frames behind it count from 0.
     pub fn note_clear(&mut self, group: ClearGroup, at: Instant, frame: Option<u64>) {
         self.cleared_in[group as usize] = frame;
+        self.standing = None;
         if group == ClearGroup::Rx {
             self.cleared_by_order = Some(at);
         }
@@ -339,7 +355,8 @@ impl CounterHistory {
     /// When the errors happened that a reading shows, at the earliest; `None` when it shows none.
     #[must_use]
     pub fn errors_since(&self, start: RegisterAddress, data: &[u8]) -> Option<Instant> {
-        if data.iter().all(|byte| *byte == 0) {
+        let is_standing = |standing: &StandingReading| standing.is(start, data);
+        if self.standing.as_ref().is_some_and(is_standing) || data.iter().all(|byte| *byte == 0) {
             return None;
         }
         let reading = ErrorCounters::from_bytes(data, start);

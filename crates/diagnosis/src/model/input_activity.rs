@@ -25,7 +25,8 @@ const STILL: Span = Span::ms(500);
 #[derive(Clone, Default, Debug)]
 pub struct InputActivity {
     last: Vec<u8>,
-    bytes: Vec<ByteActivity>,
+    /// Changes by words of eight bytes, the last one filled up.
+    words: Vec<[ByteActivity; WORD]>,
     frames: u64,
 }
 
@@ -38,31 +39,43 @@ struct ByteActivity {
     /// The first and the latest frame with a change, as they are counted here.
     first: u64,
     last: u64,
-    /// When the latest change came, in which frame.
-    seen: Option<Seen<()>>,
+    /// Time of the latest change, and the number of its frame.
+    at: Instant,
+    frame: u64,
 }
 
-impl ByteActivity {
-    /// Some bits have changed in a frame.
-    #[inline]
-    fn record(&mut self, flipped: u8, frame: u64, seen: Seen<()>) {
-        if self.changes == 0 {
-            self.first = frame;
+/// Records which bits of the bytes that `mask` names have changed in `frame`, the frame of number `number`.
+#[inline]
+fn record_word(
+    bytes: &mut [ByteActivity; WORD],
+    (mut mask, changed): (u64, u64),
+    frame: u64,
+    (at, number): (Instant, u64),
+) {
+    while mask != 0 {
+        let bit = mask.trailing_zeros() & !7;
+        mask &= mask - 1;
+        let byte = &mut bytes[bit as usize / 8 % WORD];
+        if byte.changes == 0 {
+            byte.first = frame;
         }
-        self.changes = self.changes.saturating_add(1);
-        self.flipped |= flipped;
-        self.last = frame;
-        self.seen = Some(seen);
+        byte.changes = byte.changes.saturating_add(1);
+        byte.flipped |= (changed >> bit) as u8;
+        (byte.last, byte.at, byte.frame) = (frame, at, number);
     }
 }
 
 /// Up to eight bytes as a number, the first one lowest.
 #[inline]
 fn word(bytes: &[u8]) -> u64 {
-    if let Some(whole) = bytes.first_chunk() {
-        return u64::from_le_bytes(*whole);
-    }
     bytes.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte))
+}
+
+/// The highest bit of each byte that is not 0.
+#[inline]
+const fn nonzero_bytes(word: u64) -> u64 {
+    const HIGHEST: u64 = 0x8080_8080_8080_8080;
+    (((word & !HIGHEST) + !HIGHEST) | word) & HIGHEST
 }
 
 /// A sign of life of a SubDevice.
@@ -90,31 +103,38 @@ impl InputActivity {
         let is_time = self.frames.is_multiple_of(LOOK_EVERY);
         if self.last.len() != back.len() {
             self.last = back.to_vec();
-            self.bytes = vec![ByteActivity::default(); back.len()];
+            self.words = vec![Default::default(); back.len().div_ceil(WORD)];
             return is_time;
         }
         if self.last == back {
             return is_time;
         }
-        let seen = Seen::new((), at, Some(frame));
         let (frames, len) = (self.frames, sent.len().min(back.len()));
-        let (sent, back) = (&sent[..len], &back[..len]);
-        let words = self.last[..len].chunks(WORD).zip(back.chunks(WORD)).zip(sent.chunks(WORD));
-        for (((last, back), sent), motions) in words.zip(self.bytes.chunks_mut(WORD)) {
-            let (last, back, sent) = (word(last), word(back), word(sent));
-            let mut changed = last ^ back;
+        let (sent, sent_rest) = sent[..len].as_chunks::<WORD>();
+        let (back, back_rest) = back[..len].as_chunks::<WORD>();
+        let (last, last_rest) = self.last[..len].as_chunks_mut::<WORD>();
+        let compare = |last: u64, back: u64, sent: u64, word: &mut _| {
+            let changed = last ^ back;
             // What came back as it went out is an output, or nobody's.
-            let inputs = back ^ sent;
-            while changed != 0 {
-                let bit = changed.trailing_zeros() & !7;
-                let (flipped, is_input) = ((changed >> bit) as u8, (inputs >> bit) as u8 != 0);
-                changed &= !(0xFF << bit);
-                if is_input && let Some(motion) = motions.get_mut(bit as usize / 8) {
-                    motion.record(flipped, frames, seen);
-                }
+            let mask = nonzero_bytes(changed) & nonzero_bytes(back ^ sent);
+            if mask != 0 {
+                record_word(word, (mask, changed), frames, (at, frame));
+            }
+        };
+        let mut words = self.words.iter_mut();
+        for (((last, back), sent), word) in last.iter_mut().zip(back).zip(sent).zip(&mut words) {
+            let [before, now, sent] = [*last, *back, *sent].map(u64::from_le_bytes);
+            if before != now {
+                compare(before, now, sent, word);
+                *last = *back;
             }
         }
-        self.last[..len].copy_from_slice(back);
+        if let Some(rest) = words.next()
+            && last_rest != back_rest
+        {
+            compare(word(last_rest), word(back_rest), word(sent_rest), rest);
+            last_rest.copy_from_slice(back_rest);
+        }
         is_time
     }
 
@@ -122,19 +142,22 @@ impl InputActivity {
     /// together.
     #[must_use]
     pub fn stopped(&self, offset: u16, len: u16, now: Instant) -> Option<LifeSign> {
-        let part = self.bytes.get(usize::from(offset)..usize::from(offset + len))?;
-        let flips = |motion: &&ByteActivity| {
+        let part = usize::from(offset)..usize::from(offset + len);
+        if part.start > part.end || part.end > self.last.len() {
+            return None;
+        }
+        let part = part.map(|index| self.words[index / WORD][index % WORD]);
+        let flips = |motion: &ByteActivity| {
             motion.changes >= FLIPS
                 && motion.flipped.is_power_of_two()
                 && u64::from(motion.changes) * ONE_IN >= motion.last - motion.first
         };
-        let first = part.iter().position(|motion| flips(&motion))?;
-        let motion = part.get(first)?;
-        let together = part.iter().filter(|other| {
+        let (first, motion) = part.clone().enumerate().find(|(_, motion)| flips(motion))?;
+        let together = part.filter(|other| {
             flips(other) && (other.changes, other.last) == (motion.changes, motion.last)
         });
         let bytes = together.count() as u16;
-        let last = motion.seen?;
+        let last = Seen::new((), motion.at, Some(motion.frame));
         let (frames, still) = (motion.last - motion.first + 1, self.frames - motion.last);
         let missed = still.saturating_mul(motion.changes.into()) / frames;
         let is_still = bytes > 1 && missed >= MISSED && now.since(last.at) >= STILL;

@@ -171,6 +171,8 @@ pub struct NetworkModel {
     /// True if the frame that latched receive times last went out by both cards of a ring.
     pub latched_in_ring: bool,
     revision: u64,
+    /// The state in which all were, without an error, when all were last read at once, and the revision then.
+    calm_state: Option<(AlState, u64)>,
     /// From how many controllers and receive times the tree was derived.
     tree_basis: (usize, usize),
 }

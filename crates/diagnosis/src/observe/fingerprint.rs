@@ -45,6 +45,12 @@ fn without_handing(code: u8, address: u32) -> u8 {
 }
 
 impl Fingerprint {
+    /// Of an Ethernet frame; `None` for one without datagrams.
+    #[must_use]
+    pub fn of_frame(frame: &[u8]) -> Option<Self> {
+        FrameView::parse(frame).ok().map(|view| Self::of(&view))
+    }
+
     /// Of the datagrams of a frame.
     #[must_use]
     pub fn of(view: &FrameView<'_>) -> Self {

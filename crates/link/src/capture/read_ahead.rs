@@ -1,7 +1,7 @@
 //! Reader that reads ahead in a thread of its own, so that a file is read and taken apart while its frames are judged.
 //!
 //! Frames go over in batches, whose memory goes back to be filled again: what is kept at a time is a few megabytes,
-//! however long the file is.
+//! however long the file is. The same thread prepares each frame: it works out what the frame tells without those before it.
 
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread;
@@ -18,11 +18,11 @@ const BATCH_FRAMES: usize = 2_048;
 /// Batches that wait to be taken, at most.
 const WAITING: usize = 4;
 
-/// A capture that a thread of its own reads ahead.
-pub struct ReadAhead {
-    filled: Receiver<ReadBatch>,
-    empty: Sender<ReadBatch>,
-    batch: ReadBatch,
+/// A capture that a thread of its own reads ahead, with the result `P` of the preparation of each frame.
+pub struct ReadAhead<P = ()> {
+    filled: Receiver<ReadBatch<P>>,
+    empty: Sender<ReadBatch<P>>,
+    batch: ReadBatch<P>,
     /// Frames of the batch that were gone to.
     taken: usize,
     frames: u64,
@@ -30,9 +30,8 @@ pub struct ReadAhead {
 }
 
 /// Frames that were read, and what the file had told by then.
-#[derive(Default)]
-struct ReadBatch {
-    frames: Vec<ReadFrame>,
+struct ReadBatch<P> {
+    frames: Vec<ReadFrame<P>>,
     bytes: Vec<u8>,
     interfaces: Vec<CaptureInterface>,
     skipped: Vec<SkippedLinkType>,
@@ -40,8 +39,9 @@ struct ReadBatch {
 }
 
 /// A frame but for its bytes, and where in the batch they are.
-struct ReadFrame {
+struct ReadFrame<P> {
     frame: CapturedFrame<'static>,
+    prepared: P,
     at: usize,
     stored_len: usize,
     /// Offset of the Ethernet frame within what was stored.
@@ -49,12 +49,15 @@ struct ReadFrame {
     len: usize,
 }
 
-impl ReadAhead {
-    /// Begins to read ahead.
+impl<P: Send + 'static> ReadAhead<P> {
+    /// Begins to read ahead, and to `prepare` each frame.
     ///
     /// # Errors
     /// The reader, when the system gives no thread.
-    pub fn start(reader: CaptureReader) -> Result<Self, Box<CaptureReader>> {
+    pub fn start(
+        reader: CaptureReader,
+        prepare: fn(&CapturedFrame<'_>) -> P,
+    ) -> Result<Self, Box<CaptureReader>> {
         let (fill, filled) = sync_channel(WAITING);
         let (empty, emptied) = channel();
         let (hand_over, handed_over) = channel();
@@ -62,7 +65,7 @@ impl ReadAhead {
         let started = thread.spawn(move || {
             // It comes once the thread is there.
             if let Ok(reader) = handed_over.recv() {
-                read(reader, &fill, &emptied);
+                read(reader, prepare, &fill, &emptied);
             }
         });
         if started.is_err() {
@@ -129,6 +132,13 @@ impl ReadAhead {
         Some(with_bytes(&read.frame, stored, bytes))
     }
 
+    /// Result of the preparation of the frame that [`advance`](Self::advance) went to.
+    #[must_use]
+    #[inline]
+    pub fn prepared(&self) -> Option<&P> {
+        Some(&self.batch.frames.get(self.taken.checked_sub(1)?)?.prepared)
+    }
+
     /// The interfaces that were described so far.
     #[must_use]
     pub fn interfaces(&self) -> &[CaptureInterface] {
@@ -155,10 +165,15 @@ impl ReadAhead {
 }
 
 /// The thread: fills batches until the file ends, or nobody wants more.
-fn read(mut reader: CaptureReader, fill: &SyncSender<ReadBatch>, emptied: &Receiver<ReadBatch>) {
+fn read<P>(
+    mut reader: CaptureReader,
+    prepare: fn(&CapturedFrame<'_>) -> P,
+    fill: &SyncSender<ReadBatch<P>>,
+    emptied: &Receiver<ReadBatch<P>>,
+) {
     loop {
         let mut batch = emptied.try_recv().unwrap_or_default();
-        batch.fill(&mut reader);
+        batch.fill(&mut reader, prepare);
         let is_last = batch.end.is_some();
         if fill.send(batch).is_err() || is_last {
             return;
@@ -166,8 +181,20 @@ fn read(mut reader: CaptureReader, fill: &SyncSender<ReadBatch>, emptied: &Recei
     }
 }
 
-impl ReadBatch {
-    fn fill(&mut self, reader: &mut CaptureReader) {
+impl<P> Default for ReadBatch<P> {
+    fn default() -> Self {
+        Self {
+            frames: Vec::new(),
+            bytes: Vec::new(),
+            interfaces: Vec::new(),
+            skipped: Vec::new(),
+            end: None,
+        }
+    }
+}
+
+impl<P> ReadBatch<P> {
+    fn fill(&mut self, reader: &mut CaptureReader, prepare: fn(&CapturedFrame<'_>) -> P) {
         self.frames.clear();
         self.bytes.clear();
         let mut is_ended = false;
@@ -181,8 +208,9 @@ impl ReadBatch {
             // The frame is a part of what was stored.
             let start = frame.bytes.as_ptr().addr().saturating_sub(frame.stored.as_ptr().addr());
             let (stored_len, len) = (frame.stored.len(), frame.bytes.len());
+            let prepared = prepare(&frame);
             let frame = with_bytes(&frame, &[], &[]);
-            self.frames.push(ReadFrame { frame, at, stored_len, start, len });
+            self.frames.push(ReadFrame { frame, prepared, at, stored_len, start, len });
         }
         self.interfaces = reader.interfaces().to_vec();
         self.skipped = reader.skipped().to_vec();
@@ -251,9 +279,11 @@ mod tests {
             let whole = capture(frames);
             for file in [&whole[..], &whole[..whole.len() - 2]] {
                 let mut direct = reader(file);
-                let mut ahead = ReadAhead::start(reader(file)).ok().unwrap();
+                let len = |frame: &CapturedFrame<'_>| frame.bytes.len();
+                let mut ahead = ReadAhead::start(reader(file), len).ok().unwrap();
                 while ahead.advance() {
                     assert_eq!(ahead.frame(), direct.next_frame());
+                    assert_eq!(ahead.prepared().copied(), ahead.frame().map(|one| len(&one)));
                 }
                 assert_eq!(direct.next_frame(), None);
                 assert_eq!(ahead.frame(), None, "there is none behind the last one");

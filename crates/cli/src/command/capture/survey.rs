@@ -63,8 +63,8 @@ pub(super) fn survey(
         ..Setup::default()
     };
     let (mut engine, mut survey) = (Engine::new(setup), Survey::default());
-    let whole = read(&path, &mut capture, stop, output, |frame, _| {
-        survey.handle_frame(&mut engine, frame);
+    let whole = read(&path, &mut capture, stop, output, |item, _| {
+        survey.handle_frame(&mut engine, &item.seen);
     });
     let at = capture.latest();
     engine.handle_missed(Network::default(), capture.missed(), at);

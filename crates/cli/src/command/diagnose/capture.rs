@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use linesman_capture::Survey;
-use linesman_diagnosis::{Engine, FrameSeen};
+use linesman_diagnosis::Engine;
 use linesman_link::input::Input;
 use linesman_proto::address::Network;
 use linesman_proto::time::Span;
-use linesman_runtime::capture::Capture;
+use linesman_runtime::capture::{Capture, CaptureItem};
 use linesman_runtime::stop::Stop;
 
 use super::{DiagnosisRun, Judged, names};
@@ -71,10 +71,10 @@ fn judge_frames(
     }
     // The page tells what happened by time.
     let mut survey = session.html.is_some().then(Survey::default);
-    let whole = read(path, &mut capture, stop, output, |frame, output| {
+    let whole = read(path, &mut capture, stop, output, |item, output| {
         match &mut survey {
-            Some(survey) => survey.handle_frame(&mut engine, frame),
-            None => engine.handle_frame(frame),
+            Some(survey) => survey.handle_frame(&mut engine, &item.seen),
+            None => engine.handle_frame_with(&item.seen, item.print, &mut |_, _| {}),
         }
         session.follow(&mut engine, output);
     });
@@ -112,7 +112,7 @@ pub(crate) fn read(
     capture: &mut Capture,
     stop: &Stop,
     output: &mut Output,
-    mut take: impl FnMut(&FrameSeen<'_>, &mut Output),
+    mut take: impl FnMut(&CaptureItem<'_>, &mut Output),
 ) -> ReadFrames {
     let is_whole_known = capture.progress().is_some();
     let read = |share: Option<f64>| {
@@ -121,10 +121,10 @@ pub(crate) fn read(
     let mut shown = Progress::new();
     let mut frames: u64 = 0;
     let mut is_ended = false;
-    while let Some(frame) = capture.next_frame() {
-        take(&frame, output);
+    while let Some(item) = capture.next_captured() {
+        take(&item, output);
         frames += 1;
-        let at = frame.time.as_nanos();
+        let at = item.seen.time.as_nanos();
         if frames.is_multiple_of(FRAMES_BETWEEN_LOOKS) {
             let share = capture.progress();
             shown.show(|| format!("{}{}, {}", read(share), count(frames, "frame"), time(at)));

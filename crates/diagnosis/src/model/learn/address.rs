@@ -16,6 +16,7 @@
 //! upon those of card A (S1 chapter 3: who is entered from behind is processed on the way back).
 
 mod number;
+mod station_table;
 mod unanswered;
 
 use std::collections::BTreeMap;
@@ -28,6 +29,7 @@ use super::count::CountDoubt;
 use super::{Answer, word_at};
 use crate::model::{Device, NetworkModel, Seen, SharedBy};
 use number::MOST_BY_NUMBER;
+use station_table::StationTable;
 use unanswered::Unanswered;
 
 /// Who did not answer at its station address so long ago at most, and is given one, had lost it.
@@ -41,7 +43,7 @@ const STATION: u16 = 0x0010;
 /// What positions and station addresses mean at the moment.
 #[derive(Clone, Default, Debug)]
 pub struct Addresses {
-    stations: BTreeMap<StationAddress, DeviceId>,
+    stations: StationTable,
     /// Controllers by position while all are there.
     order: Vec<DeviceId>,
     /// How many controllers a frame passes now, both cards of a ring together.
@@ -216,7 +218,7 @@ impl Addresses {
     fn named_here(&self, answer: &Answer<'_>) -> Option<DeviceId> {
         let data = if answer.effect.reads { answer.reply.data() } else { answer.written() };
         let station = word_at(data, answer.ado, STATION).filter(|_| answer.sum > 0)?;
-        self.stations.get(&StationAddress(station)).copied()
+        self.stations.get(StationAddress(station))
     }
 
     /// The controller at a place among those that are there, where some are not: those that are left keep their order.
@@ -242,15 +244,15 @@ impl Addresses {
         station: StationAddress,
         answers: bool,
     ) -> Option<DeviceId> {
-        if let Some(id) = self.stations.get(&station) {
-            return Some(*id);
+        if let Some(id) = self.stations.get(station) {
+            return Some(id);
         }
         if !answers {
             return None;
         }
         self.count_planned(model, Some(station));
-        if let Some(id) = self.stations.get(&station) {
-            return Some(*id);
+        if let Some(id) = self.stations.get(station) {
+            return Some(id);
         }
         let by_number = self.by_number(model, station, MOST_BY_NUMBER);
         let by_number = by_number.filter(|id| model.device(*id).is_some_and(Self::is_free));
@@ -314,7 +316,7 @@ impl Addresses {
     /// A guess is put right: the controller at a position says its station address. What was learnt by that address
     /// goes with it.
     fn correct(&mut self, model: &mut NetworkModel, id: DeviceId, station: StationAddress) {
-        let guessed = self.stations.get(&station).copied().filter(|guessed| *guessed != id);
+        let guessed = self.stations.get(station).filter(|guessed| *guessed != id);
         let Some(guessed) = guessed else { return self.give(model, id, station) };
         let (one, other) = (id.index(), guessed.index());
         if self.is_named || one.max(other) >= model.devices.len() {
@@ -347,7 +349,7 @@ impl Addresses {
         let is_position = answer.effect.addressing == Addressing::Position;
         let is_whole = self.present.map(usize::from) == Some(self.order.len());
         let had_another = model.device(id)?.station.is_some_and(|own| own != station);
-        let owner = *self.stations.get(&station)?;
+        let owner = self.stations.get(station)?;
         let has_it = model.device(owner)?.station == Some(station);
         (is_position && is_whole && had_another && has_it && owner != id).then_some(owner)
     }
@@ -389,7 +391,7 @@ impl Addresses {
     fn give(&mut self, model: &mut NetworkModel, id: DeviceId, station: StationAddress) {
         let Some(device) = model.device_mut(id) else { return };
         let before = device.station;
-        let is_same = before == Some(station) && self.stations.get(&station) == Some(&id);
+        let is_same = before == Some(station) && self.stations.get(station) == Some(id);
         if is_same || station.0 == 0 {
             // A device that has none any more keeps the last one, by which it will be sought.
             return;
@@ -404,7 +406,7 @@ impl Addresses {
                 device.is_silent(asked.first.at, asked.first.frame);
             }
         }
-        self.stations.retain(|_, owner| *owner != id);
+        self.stations.remove_of(id);
         if let Some(other) = self.stations.insert(station, id)
             && let Some(other) = model.device_mut(other)
         {

@@ -1,7 +1,5 @@
 //! Answers: the datagrams of a frame that came back, with what is known of their way.
 
-use std::iter;
-
 use linesman_proto::address::{Path, RegisterAddress};
 use linesman_proto::command::{Addressing, Command, Effect};
 use linesman_proto::frame::{Datagram, FrameView};
@@ -32,12 +30,27 @@ const EVERYWHERE: [std::ops::Range<u16>; 17] = [
     0x0500..0x0510,
 ];
 
+/// The same as one bit for each register, as it is asked for each datagram.
+const EVERYWHERE_BITS: [u64; 21] = {
+    let mut bits = [0; 21];
+    let mut index = 0;
+    while index < EVERYWHERE.len() {
+        let mut register = EVERYWHERE[index].start as usize;
+        while register < EVERYWHERE[index].end as usize {
+            bits[register / 64] |= 1 << (register % 64);
+            register += 1;
+        }
+        index += 1;
+    }
+    bits
+};
+
 /// Whether every controller has the register at this address.
 #[must_use]
+#[inline]
 pub(crate) fn is_register_everywhere(ado: RegisterAddress) -> bool {
-    // Most that is polled lies behind them all.
-    let [.., last] = &EVERYWHERE;
-    ado.0 < last.end && EVERYWHERE.iter().any(|range| range.contains(&ado.0))
+    let bits = EVERYWHERE_BITS.get(usize::from(ado.0) / 64);
+    bits.is_some_and(|bits| bits >> (ado.0 % 64) & 1 != 0)
 }
 
 /// One datagram on its way back, with all there is to know of it.
@@ -124,48 +137,58 @@ fn handed(command: Command, request: Option<Datagram<'_>>) -> Command {
     }
 }
 
-/// The datagrams of a frame that came back, one by one; `None` for one whose command is not known.
+/// Hands the datagrams of a frame that came back to `take`, one by one; `None` for one whose command is not known.
 #[inline]
-pub fn answers<'a>(
-    exchange: &'a Exchange<'_>,
+pub fn each_answer<'a>(
+    exchange: &Exchange<'_>,
     request: Option<&FrameCopy<'a>>,
     reply: &FrameCopy<'a>,
-) -> impl Iterator<Item = Option<Answer<'a>>> {
-    let (at, frame) = (reply.time, reply.number);
-    let mut replies = FrameView::parse(reply.bytes).ok().map(|view| view.datagrams());
-    let mut requests =
-        request.and_then(|copy| FrameView::parse(copy.bytes).ok()).map(|view| view.datagrams());
-    let mut indexes = 0..;
-    iter::from_fn(move || {
-        loop {
-            let datagram = replies.as_mut()?.next()?.ok()?;
-            let index = indexes.next()?;
-            let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
-            // A request may go out with a count in its working counter: what was added matters.
-            let sent = request.map_or(0, |request| request.wkc().0);
-            let sum = exchange.added(index, sent, datagram.wkc().0);
-            let own = datagram.wkc().0.saturating_sub(sent);
-            let Some(command) = datagram.command() else { return Some(None) };
-            let command = handed(command, request);
-            if exchange.is_part && sum == 0 {
-                continue;
-            }
-            return Some(Some(Answer {
-                command,
-                effect: command.effect(),
-                request,
-                reply: datagram,
-                ado: datagram.ado(),
-                sum,
-                own,
-                is_last: exchange.is_last,
-                is_single: exchange.is_last && exchange.earlier.is_empty(),
-                sent_by: exchange.sent_by,
-                knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
-                sent_at: exchange.request.map(|request| request.time),
-                at,
-                frame,
-            }));
+    mut take: impl FnMut(Option<&Answer<'a>>),
+) {
+    let Ok(view) = FrameView::parse(reply.bytes) else { return };
+    let request = request.and_then(|copy| FrameView::parse(copy.bytes).ok());
+    let mut requests = request.map(|view| view.datagrams());
+    for (index, datagram) in view.datagrams().map_while(Result::ok).enumerate() {
+        let request = requests.as_mut().and_then(Iterator::next).and_then(Result::ok);
+        // A request may go out with a count in its working counter: what was added matters.
+        let sent = request.map_or(0, |request| request.wkc().0);
+        let sum = exchange.added(index, sent, datagram.wkc().0);
+        let Some(command) = datagram.command() else {
+            take(None);
+            continue;
+        };
+        let command = handed(command, request);
+        if exchange.is_part && sum == 0 {
+            continue;
         }
-    })
+        take(Some(&Answer {
+            command,
+            effect: command.effect(),
+            request,
+            reply: datagram,
+            ado: datagram.ado(),
+            sum,
+            own: datagram.wkc().0.saturating_sub(sent),
+            is_last: exchange.is_last,
+            is_single: exchange.is_last && exchange.earlier.is_empty(),
+            sent_by: exchange.sent_by,
+            knows_cards: exchange.request.is_some_and(|request| request.path.is_some()),
+            sent_at: exchange.request.map(|request| request.time),
+            at: reply.time,
+            frame: reply.number,
+        }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn registers_of_every_controller_are_those_of_the_table() {
+        for ado in 0..=u16::MAX {
+            let is_in_table = EVERYWHERE.iter().any(|range| range.contains(&ado));
+            assert_eq!(is_register_everywhere(RegisterAddress(ado)), is_in_table, "{ado:#06x}");
+        }
+    }
 }

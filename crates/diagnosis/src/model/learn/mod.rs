@@ -20,7 +20,7 @@ use linesman_proto::frame::FrameView;
 
 pub use address::Addresses;
 pub(crate) use answer::is_register_everywhere;
-pub use answer::{Answer, answers};
+pub use answer::{Answer, each_answer};
 use count::CountDoubt;
 pub(super) use mailbox_state::AwaitedBit;
 
@@ -53,6 +53,7 @@ impl Learner {
         if self.addresses.expect_unanswered(model) | self.addresses.settle(model) {
             // What was under way was noted by the identities of before.
             self.transfers = sii::Transfers::default();
+            model.calm_state = None;
         }
     }
 
@@ -83,16 +84,17 @@ impl Learner {
             return;
         };
         model.traffic.questions.answered += 1;
-        for answer in answers(exchange, exchange.request.as_ref(), reply).flatten() {
+        each_answer(exchange, exchange.request.as_ref(), reply, |answer| {
+            let Some(answer) = answer else { return };
             let is_single =
                 matches!(answer.effect.addressing, Addressing::Position | Addressing::Station);
             // How many answer a broadcast in UDP says how many process UDP.
             if is_single && !answer.effect.writes {
                 let (register, len) = (answer.ado, answer.reply.data_len() as u16);
                 model.traffic.questions.note_read(register, len);
-                self.single(model, &answer);
+                self.single(model, answer);
             }
-        }
+        });
     }
 
     fn answered(
@@ -116,18 +118,18 @@ impl Learner {
             model.touch();
         }
         let mut events = None;
-        for answer in answers(exchange, request, reply) {
+        each_answer(exchange, request, reply, |answer| {
             let Some(answer) = answer else {
                 if exchange.is_last {
                     model.traffic.datagrams.record_judged();
                 }
-                continue;
+                return;
             };
             if let Some(added) = answer.added_events() {
                 *events.get_or_insert(0) |= added;
             }
-            self.datagram(model, &answer);
-        }
+            self.datagram(model, answer);
+        });
         if let Some(added) = events
             && model.events.record(added, reply.time, reply.number)
         {

@@ -197,19 +197,26 @@ pub(super) fn broadcast_read(model: &mut NetworkModel, answer: &Answer<'_>) {
     let (Some(state), true, false) = (states.all_in(), everybody, states.any_error()) else {
         return;
     };
-    let mut news = false;
     for device in &mut model.devices {
-        let status = AlStatus::new(state);
         let before = device.al.latest_reading;
         device.al.latest_reading = Some(before.map_or(answer.at, |before| before.max(answer.at)));
+    }
+    if model.calm_state == Some((state, model.revision())) {
+        return;
+    }
+    let (mut news, mut are_calm) = (false, true);
+    for device in &mut model.devices {
         // Other bits than state and error are not known from here.
         if !device.al.is_in(state) || device.al.has_error() {
+            let status = AlStatus::new(state);
             news |= device.al.record_status(status, answer.at, Some(answer.frame));
         }
+        are_calm &= device.al.is_calm_in(state);
     }
     if news {
         model.touch();
     }
+    model.calm_state = are_calm.then_some((state, model.revision()));
 }
 
 /// All controllers' registers were written.

@@ -58,7 +58,7 @@ impl Addresses {
         // While nobody has counted them the number alone tells.
         let is_counted = self.present.is_some() || !self.order.is_empty();
         let count = if is_counted { self.order.len() } else { MOST_UNCOUNTED };
-        let known = self.stations.keys().chain([&station]).map(|one| one.0);
+        let known = self.stations.keys().chain([station]).map(|one| one.0);
         let (first, is_its_own) = first_station(model, known, count)?;
         let place = usize::from(station.0 - first);
         if place < model.devices.len() {
@@ -100,7 +100,7 @@ impl Addresses {
         for (position, id) in self.order.clone().into_iter().enumerate() {
             if model.device(id).is_some_and(is_counted) {
                 let station = StationAddress(first.wrapping_add(position as u16));
-                self.stations.retain(|_, owner| *owner != id);
+                self.stations.remove_of(id);
                 self.stations.insert(station, id);
             }
         }

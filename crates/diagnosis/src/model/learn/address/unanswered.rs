@@ -115,7 +115,7 @@ impl Addresses {
     ) {
         let Some(asked) = self.unanswered.remove(&station) else { return };
         model.asked_in_vain.retain(|one| *one != station);
-        let device = self.stations.get(&station).and_then(|id| model.device_mut(*id));
+        let device = self.stations.get(station).and_then(|id| model.device_mut(id));
         if let Some(device) = device.filter(|one| asked.others_answer && one.silent.is_none()) {
             device.is_silent(asked.first.at, asked.first.frame);
         }
@@ -128,7 +128,7 @@ impl Addresses {
             return;
         }
         for (station, asked) in self.unanswered.iter().filter(|(_, one)| one.is_expected()) {
-            let device = self.stations.get(station).and_then(|id| model.device_mut(*id));
+            let device = self.stations.get(*station).and_then(|id| model.device_mut(id));
             let device = device.filter(|one| one.answered.is_none() && one.silent.is_none());
             if let Some(device) = device {
                 device.is_silent(asked.first.at, asked.first.frame);
