@@ -3,7 +3,7 @@
 //!
 //! Both act in the same form. Faults that destroy symbols, or drop frames, hit the next frame at each moment at which the
 //! drawn one acted, on the same directions of links as far as the cause reaches them: a damaged output has one direction,
-//! a worn cable two, interference all that were hit. PlayedEffect takes links or power away does so at the moment of the drawn one.
+//! a worn cable two, interference all that were hit. Links and supplies are taken away at the moment of the drawn one.
 //! Chance has no part in that but what the seed of the line gives both alike.
 
 #![expect(
@@ -48,11 +48,11 @@ pub struct SetTrial {
     pub set: String,
     /// The cause that was named.
     pub cause: FaultName,
-    /// Whether they differed.
+    /// Difference between the two plays.
     pub outcome: SetOutcome,
 }
 
-/// Difference between the two plays.
+/// First difference between the two plays, if there is one.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SetOutcome {
@@ -210,6 +210,7 @@ struct PlayedForm<'a> {
     what: PlayedEffect,
 }
 
+/// Effects of the drawn fault, as they are played again.
 enum PlayedEffect {
     /// Hits on directions of links, each with its moments; the claim is about the first.
     Hits(Vec<(Hop, Vec<Instant>)>),
