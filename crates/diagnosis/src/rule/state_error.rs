@@ -5,7 +5,7 @@
 //! **How it is found.** AL status is read with the error bit, and the code shortly after. If the
 //! SubDevice had not yet been in the state that AL control (0x0120) asked for, it *refused* the change
 //! (`S200`); if it had been there, it *left* that state by itself (`S201`, watchdog `S202`,
-//! synchronisation `T400`).
+//! synchronisation `T400`). A watchdog watches in OP alone: who is asked for OP and gives 0x001B was there for a moment.
 //!
 //! Where nobody reads the code, an error in SAFEOP while process data are exchanged is most likely an expired watchdog: it
 //! is the one that takes a SubDevice there whenever outputs stay away.
@@ -209,14 +209,15 @@ fn starved_together(view: &View<'_>, conditions: &[Condition]) -> Option<Conditi
 }
 
 fn page_of(model: &NetworkModel, error: &AlError) -> &'static RulePage {
-    // Who was higher before and was asked for nothing has left; a watchdog watches those that are in OP alone.
+    // Who was higher before and was asked for nothing has left; a watchdog watches those that are in OP alone, so that who
+    // is asked for OP and signals it was there for a moment.
     let fell = error.from.is_some_and(|from| error.status.value.state().state() < Some(from));
     let watchdog = AlStatusCode::SYNC_MANAGER_WATCHDOG;
     let is_watchdog = error.code.is_some_and(|code| code.value == watchdog);
     // A MainDevice that is refused a state while it starts does not go on to exchange process data.
     let is_unread = error.code.is_none() && error.from.is_none() && !model.cyclic.is_empty();
-    let asked_for_nothing = error.requested.is_none() && (fell || is_watchdog || is_unread);
-    if !error.had_arrived && !asked_for_nothing {
+    let asked_for_nothing = error.requested.is_none() && (fell || is_unread);
+    if !error.had_arrived && !asked_for_nothing && !is_watchdog {
         return &REFUSED;
     }
     match error.code.map(|code| code.value) {

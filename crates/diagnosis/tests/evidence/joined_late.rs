@@ -1,6 +1,6 @@
 //! Listeners that join a line late: findings about what happened before the first frame that they hear.
 
-use crate::support::script::{Datagram, Script, apwr, fprd, lrw};
+use crate::support::script::{Datagram, Script, apwr, fprd, fpwr, lrw};
 use crate::support::text;
 use linesman_config::fault::FaultName;
 use linesman_config::project::Project;
@@ -106,6 +106,22 @@ fn frames_late_by_less_than_a_watchdog_holds_explain_a_lost_step_and_no_expired_
         let lost_step = first.consequences.iter().any(|one| one.code == "T400");
         assert_eq!(lost_step, expected == "T411", "{}", text(&report));
     }
+}
+
+#[test]
+fn watchdog_that_expires_whenever_op_is_asked_for_is_no_refusal() {
+    let mut script = listening(SOEM, None);
+    cycles(&mut script, 100, 4, 0x1001, &[Some(OP), Some(OP), Some(SAFE_OP)]);
+    for _ in 0..5 {
+        script.exchange(&[fpwr(0x1003, 0x0120, &[8, 0])]);
+        cycles(&mut script, 20, 4, 0x1001, &[Some(OP), Some(OP), Some(WATCHDOG)]);
+        script.exchange(&[fpwr(0x1003, 0x0120, &[0x14, 0])]);
+        cycles(&mut script, 20, 4, 0x1001, &[Some(OP), Some(OP), Some(SAFE_OP)]);
+    }
+    let report = report(&mut script);
+    let first = &report.findings[0];
+    assert_eq!((first.code.as_str(), device(first)), ("S202", Some(3)), "{}", text(&report));
+    assert!(!codes(&report).contains(&"S200"), "{}", text(&report));
 }
 
 #[test]
