@@ -34,7 +34,7 @@ pub(crate) async fn send_frame(
         transaction.step = Step::Fragment(sent);
     }
     // A SubDevice whose own messages are not fetched takes no more of ours.
-    transaction.multiplexer.drain().await;
+    transaction.multiplexer.drain_unless_empty().await;
     let again = transaction.multiplexer.repetitions().wrapping_sub(before);
     Ok([sent.to_le_bytes(), again.to_le_bytes()].concat())
 }

@@ -6,6 +6,7 @@
 mod fetch;
 
 use linesman_config::plan::DevicePlan;
+use linesman_config::plan::ethernet::FullPause;
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::ads::AmsNetId;
 use linesman_proto::mailbox::coe::Message as CoeMessage;
@@ -19,12 +20,15 @@ use super::ethernet::UnansweredFragments;
 use super::failure::Why;
 use super::pass::PassedTransfer;
 use crate::event::Event;
-use crate::exchange::{ExchangeError, Request, Target};
+use crate::exchange::{ExchangeError, Reply, Request, Target};
 use crate::executor::Wire;
+use crate::executor::wire::Exchanging;
 
 const OUT: u16 = 0;
 const IN: u16 = 1;
 const STATUS_AT: u16 = 5;
+/// Bytes of registers from the status of SyncManager 0 to that of SyncManager 1, with both.
+const BOTH_STATUSES: u16 = SYNC_MANAGER.len + 1;
 const FIRST_POLL: Span = Span::us(500);
 const SLOWEST_POLL: Span = Span::ms(10);
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long while an answer is
@@ -71,6 +75,9 @@ pub(crate) struct Multiplexer {
     /// When a fragment of an Ethernet frame was sent or came.
     last_frame: Option<Instant>,
     fragments: UnansweredFragments,
+    /// Whether the mailbox to us held something when the last fragment was written; `None`: not known, or looked into since.
+    holds: Option<bool>,
+    full_pause: FullPause,
     /// Its NetId, for AoE.
     net_id: AmsNetId,
     /// Number of the last ADS request.
@@ -103,6 +110,8 @@ impl Multiplexer {
             repetitions: 0,
             last_frame: None,
             fragments: UnansweredFragments::default(),
+            holds: None,
+            full_pause: FullPause::default(),
             net_id: device
                 .net_id()
                 .unwrap_or(AmsNetId::of_main_device([127, 0, 0, 1]).of_sub_device(device.station)),
@@ -117,6 +126,7 @@ impl Multiplexer {
         (self.repetition_due, self.repeats_on_request) = (false, true);
         self.passed = PassedTransfer::default();
         self.fragments = UnansweredFragments::default();
+        self.holds = None;
     }
 
     /// It is the mailbox of BOOT from now on, or that of all other states. False when it has none
@@ -258,16 +268,32 @@ impl Multiplexer {
         }
         loop {
             let request = Request::write(self.target, self.areas.receive.offset, &buffer);
-            match self.wire.submit(request).await {
+            let writing = self.wire.submit(request);
+            // Fragments come one behind the other, and find the mailbox full more often than not: why one is not taken, and
+            // whether the SubDevice has something itself, is read in the same frame.
+            let statuses = is_frame.then(|| self.read_statuses());
+            let written = writing.await;
+            let full = match statuses {
+                Some(statuses) => self.take_statuses(statuses.await),
+                None => None,
+            };
+            match written {
                 Ok(reply) if reply.answered() => {
                     // One without a counter that was taken twice is answered twice.
                     self.late |= uncertain && counter == Counter::NONE;
+                    if is_frame {
+                        self.full_pause.accepted(self.wire.now());
+                    }
                     return Ok(true);
                 }
                 // Full, unless the SubDevice does not answer at all. After a lost frame it is our own
                 // message that fills it.
                 Ok(_) => {
-                    if self.is_full(OUT).await? && uncertain {
+                    let full = match full {
+                        Some(full) => full,
+                        None => self.is_full(OUT).await?,
+                    };
+                    if full && uncertain {
                         return Ok(true);
                     }
                 }
@@ -279,14 +305,31 @@ impl Multiplexer {
             }
             if is_frame {
                 // Frames go both ways at once: it may wait for room for its own.
-                self.drain().await;
+                self.drain_unless_empty().await;
             }
             if self.wire.now() >= until {
                 return Ok(false);
             }
+            if is_frame {
+                pause = self.full_pause.refused(self.wire.now());
+            }
             self.wire.sleep(pause).await;
             pause = (pause * 2).min(SLOWEST_POLL);
         }
+    }
+
+    /// Reads the statuses of both SyncManagers, behind what was submitted before.
+    fn read_statuses(&self) -> Exchanging {
+        self.wire.submit(Request::read(self.target, byte_of(OUT, STATUS_AT), BOTH_STATUSES))
+    }
+
+    /// Notes whether the mailbox to us holds something, and says whether the other one is full; `None` where nobody answered.
+    fn take_statuses(&mut self, answer: Result<Reply, ExchangeError>) -> Option<bool> {
+        let reply = answer.ok().filter(Reply::answered);
+        let full =
+            |at| reply.as_ref().map(|reply| SmStatus(reply.bytes::<1>(at)[0]).mailbox_full());
+        self.holds = full(usize::from(BOTH_STATUSES) - 1);
+        full(0)
     }
 
     async fn is_full(&self, manager: u16) -> Result<bool, ExchangeError> {
@@ -339,6 +382,13 @@ impl Multiplexer {
             }
         }
         true
+    }
+
+    /// The same, unless nothing was there when the last fragment was written.
+    pub(crate) async fn drain_unless_empty(&mut self) {
+        if self.holds != Some(false) {
+            self.drain().await;
+        }
     }
 
     /// Hands a message on by its type. What may be an answer of the protocol that is `wanted` is

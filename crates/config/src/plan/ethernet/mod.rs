@@ -2,6 +2,7 @@
 //! throughput to expect, routes into other subnets.
 
 mod address;
+mod full_pause;
 mod rate;
 mod route;
 mod subnet;
@@ -13,6 +14,7 @@ use linesman_proto::sii::Protocols;
 use super::{DevicePlan, Doubt, Plan, Severity};
 use crate::start_up::StartUpAction;
 
+pub use full_pause::FullPause;
 pub use rate::{ACYCLIC_FRAMES, EthernetRate, RateLimit};
 pub use route::{EthernetRoute, RouteStep};
 pub use subnet::Subnet;

@@ -3,21 +3,24 @@
 //! A TCP segment of 1,460 bytes is a frame of 1,514, and that is as many mailbox messages as it has fragments. The messages
 //! of some cycles are played in advance: beside the cyclic frames so many others leave in each cycle
 //! ([`ACYCLIC_FRAMES`]), one behind the answer to the other, and all share the wire. A message from a SubDevice takes two frames, a
-//! look whether there is one and the mailbox itself; one to it takes the mailbox, and looks while it is full. Divided
-//! numbers (one message in a cycle, or the share of the wire that is free) are 25 % off and more: they leave out that two
-//! messages fit into a cycle, and that a frame waits for the answer to the one before.
+//! look whether there is one and the mailbox itself; one to it takes one, and one more for each try that finds the mailbox
+//! full ([`FullPause`]). Divided numbers (one message in a cycle, or the share of the wire that is free) are 25 % off and
+//! more: they leave out that two messages fit into a cycle, and that a frame waits for the answer to the one before.
 
 use linesman_proto::address::DeviceId;
-use linesman_proto::ethernet::MIN_LEN;
-use linesman_proto::frame::size::{BYTE_NS, frame_size, wire_time};
+use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
+use linesman_proto::frame::size::{BYTE_NS, WIRE_OVERHEAD, frame_size, wire_time};
 use linesman_proto::mailbox::HEADER_LEN;
 use linesman_proto::mailbox::eoe::{EOE_HEADER_LEN, fragments};
-use linesman_proto::time::Span;
+use linesman_proto::time::{Instant, Span};
 
+use super::FullPause;
 use crate::plan::{DevicePlan, Plan};
 
 /// Frames of procedures that leave in a cycle, at most.
 pub const ACYCLIC_FRAMES: usize = 4;
+/// Bytes with the statuses of both mailboxes, which are read in the frame of each message to a SubDevice.
+const STATUSES: usize = 9;
 /// The longest frame without a VLAN tag, in bytes.
 const FRAME: usize = 1_514;
 /// What of it is data of a TCP connection, in bytes: without the headers of Ethernet, IP and TCP.
@@ -26,8 +29,6 @@ const DATA: u64 = 1_460;
 const WITHOUT_CYCLE: Span = Span::ms(1);
 /// Time that a SubDevice is taken to need for a message. No plan tells: it is what those of a virtual segment need.
 const MESSAGE_TIME: Span = Span::us(600);
-/// The first wait while a mailbox is full, and the longest: each is twice as long as the one before.
-const FULL_WAITS: [Span; 2] = [Span::us(500), Span::ms(10)];
 /// Cycles that are played before messages are counted: a wire that is nearly full takes so long until as many frames wait
 /// as will.
 const SETTLING: u64 = 500;
@@ -68,13 +69,14 @@ pub struct EthernetRate {
 
 impl EthernetRate {
     /// Data of a TCP connection from the SubDevice, in bytes a second, when every second segment is acknowledged:
-    /// the frame of an acknowledgement is one mailbox message the other way, which takes the time of one of its own. `None` in
-    /// the other direction: no plan tells how soon a SubDevice acknowledges. With large mailboxes and cycles below 1 ms it may be
-    /// a quarter less: the time that the SubDevice takes for an acknowledgement is left out.
+    /// the frame of an acknowledgement is one mailbox message the other way, and takes one frame where a message from the
+    /// SubDevice takes two. `None` in the other direction: no plan tells how soon a SubDevice acknowledges. With large
+    /// mailboxes and cycles below 1 ms it may be a quarter less: the time that the SubDevice takes for an acknowledgement is
+    /// left out.
     #[must_use]
     pub fn tcp_bytes_per_second(&self) -> Option<u64> {
         let fragments = self.fragments as u64;
-        self.from_device.then(|| self.bytes_per_second * 2 * fragments / (2 * fragments + 1))
+        self.from_device.then(|| self.bytes_per_second * 4 * fragments / (4 * fragments + 1))
     }
 }
 
@@ -96,7 +98,7 @@ impl Plan {
             let mut wire = PlayedWire::of(self, loads);
             let messages = match from_device {
                 true => wire.messages_from(mailbox, device.mailbox_state.is_some()),
-                false => wire.messages_to(mailbox, fragments, message_time),
+                false => wire.messages_to(mailbox, message_time),
             };
             (wire.end - wire.begin) / messages.max(1)
         };
@@ -165,11 +167,12 @@ impl PlayedWire {
         Self { cyclic, next: 0, held: 0, left: 0, way, begin, end, count: 0, told_full: None }
     }
 
-    /// A frame of procedures with a datagram of so many bytes is ready to leave: when it has passed the SubDevices, if
-    /// that is before the end.
-    fn send(&mut self, mut now: u64, bytes: usize) -> Option<u64> {
+    /// Datagrams of procedures of so many bytes are ready to leave, in one frame where the time until the next cycle has room
+    /// for it: when they have passed the SubDevices, if that is before the end.
+    fn send(&mut self, mut now: u64, mut datagrams: &[usize]) -> Option<u64> {
         let shortest = wire_time(MIN_LEN).as_nanos();
-        loop {
+        let mut back = None;
+        while !datagrams.is_empty() {
             while let Some((at, wire)) = self.cyclic.get(self.next).filter(|(at, _)| *at <= now) {
                 self.held = self.held.max(*at) + wire;
                 self.left = ACYCLIC_FRAMES;
@@ -178,16 +181,21 @@ impl PlayedWire {
             }
             let (due, _) = self.cyclic.get(self.next)?;
             // A frame that would be under way when the next cycle begins is not sent, unless none else was.
-            if self.left == ACYCLIC_FRAMES || self.left > 0 && due - now >= shortest {
-                break;
+            if self.left == 0 || self.left < ACYCLIC_FRAMES && due - now < shortest {
+                now = *due;
+                continue;
             }
-            now = *due;
+            let room = usize::try_from((due - now) / BYTE_NS).unwrap_or(MAX_LEN);
+            let room = room.saturating_sub(WIRE_OVERHEAD).clamp(MIN_LEN, MAX_LEN);
+            let size = |count: usize| frame_size(datagrams[..count].iter().copied());
+            let count = (2..=datagrams.len()).rev().find(|count| size(*count) <= room).unwrap_or(1);
+            self.left -= 1;
+            self.held = self.held.max(now) + wire_time(size(count)).as_nanos();
+            // The gap behind a frame is no time of its own.
+            back = Some((self.held + self.way).saturating_sub(12 * BYTE_NS));
+            datagrams = &datagrams[count..];
         }
-        self.left -= 1;
-        self.held = self.held.max(now) + wire_time(frame_size([bytes])).as_nanos();
-        // The gap behind a frame is no time of its own.
-        let back = (self.held + self.way).saturating_sub(12 * BYTE_NS);
-        (back < self.end).then_some(back)
+        back.filter(|back| *back < self.end)
     }
 
     /// A message has passed.
@@ -201,23 +209,23 @@ impl PlayedWire {
         loop {
             let told = self.told_full.take_if(|at| is_mapped && *at <= now).is_some();
             if !told {
-                let Some(looked) = self.send(now, 1) else { return self.count };
+                let Some(looked) = self.send(now, &[1]) else { return self.count };
                 now = looked;
             }
-            let Some(fetched) = self.send(now, mailbox) else { return self.count };
+            let Some(fetched) = self.send(now, &[mailbox]) else { return self.count };
             now = fetched;
             self.passed(now);
         }
     }
 
     /// Messages that go to a SubDevice that takes so long for each; the next one waits in its mailbox meanwhile.
-    fn messages_to(&mut self, mailbox: usize, fragments: usize, message_time: Span) -> u64 {
-        let (mut now, mut sent) = (0, 0_u64);
+    fn messages_to(&mut self, mailbox: usize, message_time: Span) -> u64 {
+        let mut now = 0;
         // When the message that is worked on is done, and the one that waits behind it.
         let (mut busy, mut waits) = (0, false);
-        let mut pause = FULL_WAITS[0].as_nanos();
+        let mut pause = FullPause::default();
         loop {
-            let Some(written) = self.send(now, mailbox) else { return self.count };
+            let Some(written) = self.send(now, &[mailbox, STATUSES]) else { return self.count };
             now = written;
             if waits && busy <= written {
                 (busy, waits) = (busy + message_time.as_nanos(), false);
@@ -228,20 +236,10 @@ impl PlayedWire {
                     false => waits = true,
                 }
                 self.passed(now);
-                (sent, pause) = (sent + 1, FULL_WAITS[0].as_nanos());
-                if sent.is_multiple_of(fragments as u64) {
-                    // Whether it has something to say.
-                    let Some(looked) = self.send(now, 1) else { return self.count };
-                    now = looked;
-                }
+                pause.accepted(Instant::from_nanos(now));
                 continue;
             }
-            for _ in 0..2 {
-                let Some(looked) = self.send(now, 1) else { return self.count };
-                now = looked;
-            }
-            now += pause;
-            pause = (pause * 2).min(FULL_WAITS[1].as_nanos());
+            now += pause.refused(Instant::from_nanos(now)).as_nanos();
         }
     }
 }

@@ -142,10 +142,10 @@ fn throughput_follows_from_mailbox_cycle_and_free_bandwidth() {
     // Two fragments: limited by the 600 µs that the SubDevice is taken to need for each; from it two a cycle.
     let (to, limit) = rate(1_024, 1_000, &[60]);
     assert_eq!(limit, RateLimit::SubDevice);
-    assert!((900_000..1_100_000).contains(&to), "{to}");
+    assert!((1_200_000..1_220_000).contains(&to), "{to}");
     let from = rates(1_024, Span::us(1_000), &[60])[1];
     assert_eq!((from.bytes_per_second / 10_000, from.limit), (146, RateLimit::Cycle));
-    assert_eq!(from.tcp_bytes_per_second(), Some(from.bytes_per_second * 4 / 5));
+    assert_eq!(from.tcp_bytes_per_second(), Some(from.bytes_per_second * 8 / 9));
     assert_eq!(rates(1_024, Span::us(1_000), &[60])[0].tcp_bytes_per_second(), None);
     for (mailbox, us) in [(512, 500), (1_024, 1_000), (1_024, 500), (1_024, 250), (1_486, 250)] {
         let (bytes, _) = rate(mailbox, us, &[60]);

@@ -20,8 +20,10 @@ impl Multiplexer {
         if self.repetition_due {
             self.fetch_again().await?;
         }
-        // What the cycle has seen need not be asked for.
-        if !self.queues.take_full(self.id) && !self.is_full(IN).await? {
+        // What the cycle has seen need not be asked for, nor what a fragment's frame has told.
+        let is_told = self.holds.take() == Some(true);
+        let is_seen = self.queues.take_full(self.id);
+        if !is_told && !is_seen && !self.is_full(IN).await? {
             return Ok(None);
         }
         let area = self.areas.send;
