@@ -159,6 +159,15 @@ impl DamageGroup {
         self.damages.iter().map(|damage| damage.first).min()
     }
 
+    fn last(&self) -> Option<Instant> {
+        self.damages.iter().map(|damage| damage.last).max()
+    }
+
+    /// How often it was hit.
+    fn hits(&self) -> u64 {
+        self.damages.iter().map(|damage| damage.frames.max(damage.symbols.unwrap_or(0))).sum()
+    }
+
     fn has_symbols(&self) -> bool {
         self.damages.iter().any(|damage| damage.symbols.is_some_and(|symbols| symbols > 0))
     }
@@ -298,7 +307,27 @@ fn with_same_source(
             None => break,
         }
     }
+    if found.is_empty() {
+        found =
+            left.into_iter().filter(|other| is_hit_alike(&links[first], &links[*other])).collect();
+        if found.len() + 1 < MANY_LINKS {
+            found.clear();
+        }
+    }
     found
+}
+
+/// So many links that are hit in the same stretch of time have one source, even where hits are too few to show a rhythm
+/// that they share: so many cables do not fail at a time.
+const MANY_LINKS: usize = 3;
+
+/// Links that one source hits are hit about as often: at most so many times as often as each other.
+const ALIKE: u64 = 10;
+
+/// Whether two links are hit about as often, and one not only after the other.
+fn is_hit_alike(one: &DamageGroup, other: &DamageGroup) -> bool {
+    let overlap = one.first() <= other.last() && other.first() <= one.last();
+    overlap && one.hits() <= other.hits() * ALIKE && other.hits() <= one.hits() * ALIKE
 }
 
 /// The device at whose ports all damage is sent, or all is received.

@@ -1,6 +1,6 @@
 //! Intervals of time, such as those between two readings.
 
-use linesman_proto::time::Instant;
+use linesman_proto::time::{Instant, Span};
 
 /// From when to when something happened.
 pub type TimeInterval = (Instant, Instant);
@@ -15,6 +15,15 @@ impl Intervals {
     pub fn meet(&self, spell: TimeInterval) -> bool {
         let next = self.0.partition_point(|other| other.1 <= spell.0);
         self.0.get(next).is_some_and(|other| meet(*other, spell))
+    }
+
+    /// How much of a stretch they cover.
+    #[must_use]
+    pub fn overlap(&self, spell: TimeInterval) -> Span {
+        let first = self.0.partition_point(|other| other.1 <= spell.0);
+        let met = self.0[first..].iter().take_while(|other| other.0 < spell.1);
+        let parts = met.map(|other| other.1.min(spell.1).since(other.0.max(spell.0)));
+        parts.fold(Span::ZERO, |all, part| all + part)
     }
 }
 
@@ -64,6 +73,17 @@ mod tests {
             (11, 13, true),
         ] {
             assert_eq!(spells.meet((at(from), at(to))), meets, "{from} to {to}");
+        }
+    }
+
+    #[test]
+    fn stretch_is_covered_as_far_as_others_overlap_it() {
+        let spells: Intervals =
+            [(1, 4), (7, 9), (20, 30)].map(|(a, b)| (at(a), at(b))).into_iter().collect();
+        for (from, to, us) in
+            [(0, 1, 0), (0, 40, 15), (3, 8, 2), (4, 7, 0), (21, 22, 1), (31, 40, 0)]
+        {
+            assert_eq!(spells.overlap((at(from), at(to))), Span::us(us), "{from} to {to}");
         }
     }
 }

@@ -12,20 +12,18 @@ use crate::model::Rise;
 /// Readings further apart than this say nothing of what came at the same moment.
 const CLOSE_READING: Span = Span::ms(150);
 
-/// So many times one series is moved against the other, to see how often they meet by chance.
-const MOVES: u64 = 40;
+/// So many times one series is moved against the other, to see how much of them coincides by chance.
+const MOVES: u64 = 80;
 
-/// After so few of all moves they may meet as often, if it is not to be chance.
-const BY_CHANCE: usize = 1;
-
-/// A single meeting is none.
-const ENOUGH_MEETINGS: usize = 2;
+/// A single meeting is none. In thousandths of a hit, seen from either place.
+const ENOUGH_MEETINGS: u64 = 4_000;
 
 /// Whether the damage at two places has one source: its bursts hit both at the same moments, and both begin
 /// and end with it. Two faults of their own may last at the same time, but each goes its own way.
 ///
-/// Whether they meet more often than by chance is seen from the same two series, moved against each other in
-/// circles: each keeps its own rhythm, and how often places are hit and read does not matter.
+/// Whether more of them coincides than by chance is seen from the same two series, moved against each other in
+/// circles: each keeps its own rhythm, and how often places are hit and read does not matter. It is not counted how often
+/// hits meet, but how much of each is covered: where a place is hit between nearly any two readings, all meet.
 pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]) -> bool {
     let lasted = [a, b].map(|damages| all_hits(input, damages).last().copied());
     let (a, b) = (hits(input, a), hits(input, b));
@@ -40,23 +38,42 @@ pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]
     }
     let both = (a_first.0.max(b_first.0), a_last.1.min(b_last.1));
     let within = |hits: &[TimeInterval]| -> Vec<TimeInterval> {
-        hits.iter().copied().filter(|hit| meet(*hit, both)).collect()
+        let within = hits.iter().filter(|hit| meet(**hit, both));
+        within.map(|hit| (hit.0.max(both.0), hit.1.min(both.1))).collect()
     };
-    let (a, b) = (within(&a), Intervals::from_iter(within(&b)));
-    let met = a.iter().filter(|hit| b.meet(**hit)).count();
+    let (a, b) = (within(&a), within(&b));
+    let stretches = [&a, &b].map(|hits| hits.iter().copied().collect::<Intervals>());
     let around = both.1.since(both.0).as_nanos();
-    if met < ENOUGH_MEETINGS || around == 0 {
-        return false;
-    }
-    let moved = |(begin, end): TimeInterval, by: u64| {
-        let moved = both.0 + Span::ns((begin.since(both.0).as_nanos() + by) % around);
-        (moved, moved + end.since(begin))
+    let coincide = |by: u64| {
+        covered(&a, &stretches[1], both, by) + covered(&b, &stretches[0], both, around - by)
     };
-    let as_often = (1..MOVES).filter(|at| {
-        let by = around / MOVES * at;
-        a.iter().filter(|hit| b.meet(moved(**hit, by))).count() >= met
-    });
-    as_often.count() <= BY_CHANCE
+    let mut lengths: Vec<u64> =
+        a.iter().chain(&b).map(|(from, to)| to.since(*from).as_nanos()).collect();
+    lengths.sort_unstable();
+    let Some(length) = lengths.get(lengths.len() / 2).filter(|_| around > 0) else { return false };
+    // The same burst is read a little earlier at one place than at the other.
+    let is_near = |by: u64| by.min(around - by) <= *length;
+    let moves = (0..MOVES).map(|at| around / MOVES * at);
+    let (near, far): (Vec<u64>, Vec<u64>) = moves.partition(|by| is_near(*by));
+    let together = near.into_iter().map(coincide).max().unwrap_or(0);
+    together >= ENOUGH_MEETINGS && far.into_iter().all(|by| coincide(by) < together)
+}
+
+/// How much of the hits at one place is covered by those at the other, in thousandths of a hit, when they are moved by so many
+/// ns in a circle of time.
+fn covered(moved: &[TimeInterval], others: &Intervals, circle: TimeInterval, by: u64) -> u64 {
+    let (start, end) = circle;
+    let around = end.since(start).as_nanos();
+    let share = |(from, to): &TimeInterval| {
+        let len = to.since(*from);
+        let from = start + Span::ns((from.since(start).as_nanos() + by) % around);
+        let to = from + len;
+        // What is moved beyond the end comes in at the start.
+        let rest = to.since(end.max(from));
+        let met = others.overlap((from, to.min(end))) + others.overlap((start, start + rest));
+        met.as_nanos() * 1_000 / len.as_nanos().max(1)
+    };
+    moved.iter().map(share).sum()
 }
 
 /// When a place was hit, in order, as far as it was read closely: a hit lies between the reading before a rise

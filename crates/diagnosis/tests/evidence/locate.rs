@@ -391,6 +391,49 @@ fn noise_of_two_links_that_begins_and_ends_together_is_interference() {
 
 // proves: HW-26 partial
 #[test]
+fn links_hit_between_nearly_any_two_readings_are_told_apart_by_what_coincides() {
+    let is_hit = |at: u64, salt: u64| (at * at * salt + at * 3) % 11 < 6;
+    // Neither begins nor ends with the other.
+    let readings = |salt: [u64; 2]| -> Vec<(u64, u64)> {
+        let hit = |at, salt| u64::from(is_hit(at, salt));
+        let middle = (4..96).map(|at| (hit(at, salt[0]), hit(at, salt[1])));
+        [(1, 0); 4].into_iter().chain(middle).chain([(0, 1); 4]).collect()
+    };
+    assert_eq!(two_noisy(Span::ms(5), &readings([7, 7])), [FaultName::EmcNoise; 2]);
+    assert_eq!(two_noisy(Span::ms(5), &readings([7, 5])), [FaultName::CableDegraded; 2]);
+}
+
+/// What is said of three noisy links: symbols of each hit, and the readings with one.
+fn three_noisy(hits: [(u64, &[u64]); 3]) -> Vec<FaultName> {
+    let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
+    for at in 0..100_u64 {
+        for ((node, port), (symbols, readings)) in [(4, A), (10, A), (0, C)].into_iter().zip(hits) {
+            if readings.contains(&at) {
+                bench.noise(node, port, symbols);
+            }
+        }
+        bench.now += Span::ms(5);
+        bench.read_all();
+    }
+    bench.conditions().iter().map(|condition| condition.cause).collect()
+}
+
+// proves: HW-26 partial
+#[test]
+fn three_links_hit_in_the_same_stretch_of_time_have_one_source() {
+    let [one, other, third] = [&[2, 20, 61][..], &[10, 44, 70], &[5, 33, 66]];
+    let causes = three_noisy([(1, one), (1, other), (1, third)]);
+    assert_eq!(causes, [FaultName::EmcNoise; 3]);
+    // One that is hit only after the others, or far more often, is a fault of its own, and two may be two faults.
+    for hits in
+        [[(1, one), (1, other), (1, &[80, 88, 94][..])], [(1, one), (60, other), (1, third)]]
+    {
+        assert_eq!(three_noisy(hits), [FaultName::CableDegraded; 3], "{hits:?}");
+    }
+}
+
+// proves: HW-26 partial
+#[test]
 fn a_link_that_falls_together_with_one_of_several_belongs_to_all() {
     let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
     // The first and the last never meet; the one between them meets both.
