@@ -163,7 +163,7 @@ impl DamageGroup {
         self.damages.iter().map(|damage| damage.last).max()
     }
 
-    /// How often it was hit.
+    /// Number of hits.
     fn hits(&self) -> u64 {
         self.damages.iter().map(|damage| damage.frames.max(damage.symbols.unwrap_or(0))).sum()
     }
@@ -317,14 +317,14 @@ fn with_same_source(
     found
 }
 
-/// So many links that are hit in the same stretch of time have one source, even where hits are too few to show a rhythm
-/// that they share: so many cables do not fail at a time.
+/// Number of links from which on those that are hit in the same stretch of time have one source, even where hits are too few
+/// to show a rhythm that they share: so many cables do not fail at a time.
 const MANY_LINKS: usize = 3;
 
-/// Links that one source hits are hit about as often: at most so many times as often as each other.
+/// Links that one source hits are hit about as often: none more than this many times as often as another.
 const ALIKE: u64 = 10;
 
-/// Whether two links are hit about as often, and one not only after the other.
+/// True if two links are hit about as often, and one not only after the other.
 fn is_hit_alike(one: &DamageGroup, other: &DamageGroup) -> bool {
     let overlap = one.first() <= other.last() && other.first() <= one.last();
     overlap && one.hits() <= other.hits() * ALIKE && other.hits() <= one.hits() * ALIKE

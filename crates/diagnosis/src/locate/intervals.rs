@@ -17,7 +17,7 @@ impl Intervals {
         self.0.get(next).is_some_and(|other| meet(*other, spell))
     }
 
-    /// How much of a stretch they cover.
+    /// Length of the parts of a stretch that they cover.
     #[must_use]
     pub fn overlap(&self, spell: TimeInterval) -> Span {
         let first = self.0.partition_point(|other| other.1 <= spell.0);

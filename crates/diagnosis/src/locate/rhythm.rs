@@ -12,18 +12,18 @@ use crate::model::Rise;
 /// Readings further apart than this say nothing of what came at the same moment.
 const CLOSE_READING: Span = Span::ms(150);
 
-/// So many times one series is moved against the other, to see how much of them coincides by chance.
+/// Steps by which one series is moved against the other, to see how much of them coincides by chance.
 const MOVES: u64 = 80;
 
-/// A single meeting is none. In thousandths of a hit, seen from either place.
+/// Two hits that are covered wholly, counted at either place, in thousandths of a hit: a single meeting is none.
 const ENOUGH_MEETINGS: u64 = 4_000;
 
 /// Whether the damage at two places has one source: its bursts hit both at the same moments, and both begin
 /// and end with it. Two faults of their own may last at the same time, but each goes its own way.
 ///
-/// Whether more of them coincides than by chance is seen from the same two series, moved against each other in
-/// circles: each keeps its own rhythm, and how often places are hit and read does not matter. It is not counted how often
-/// hits meet, but how much of each is covered: where a place is hit between nearly any two readings, all meet.
+/// The same two series, moved against each other in circles, show what coincides by chance: each keeps its own rhythm, and
+/// it does not matter how often places are hit and read. Not meetings are counted, but the covered part of each hit: where a
+/// place is hit between nearly any two readings, all hits meet.
 pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]) -> bool {
     let lasted = [a, b].map(|damages| all_hits(input, damages).last().copied());
     let (a, b) = (hits(input, a), hits(input, b));
@@ -59,8 +59,8 @@ pub(super) fn falls_together(input: &LocateInput<'_>, a: &[Damage], b: &[Damage]
     together >= ENOUGH_MEETINGS && far.into_iter().all(|by| coincide(by) < together)
 }
 
-/// How much of the hits at one place is covered by those at the other, in thousandths of a hit, when they are moved by so many
-/// ns in a circle of time.
+/// Sum of the parts of the hits at one place that those at the other cover, in thousandths of a hit, when they are moved by
+/// `by` ns in a circle of time.
 fn covered(moved: &[TimeInterval], others: &Intervals, circle: TimeInterval, by: u64) -> u64 {
     let (start, end) = circle;
     let around = end.since(start).as_nanos();

@@ -403,7 +403,7 @@ fn links_hit_between_nearly_any_two_readings_are_told_apart_by_what_coincides() 
     assert_eq!(two_noisy(Span::ms(5), &readings([7, 5])), [FaultName::CableDegraded; 2]);
 }
 
-/// What is said of three noisy links: symbols of each hit, and the readings with one.
+/// Causes that are named for three noisy links: symbols of each hit, and the readings with one.
 fn three_noisy(hits: [(u64, &[u64]); 3]) -> Vec<FaultName> {
     let mut bench = Bench::new(fifteen(), vec![(true, false); 15]);
     for at in 0..100_u64 {

@@ -75,7 +75,7 @@ pub(crate) struct Multiplexer {
     /// When a fragment of an Ethernet frame was sent or came.
     last_frame: Option<Instant>,
     fragments: UnansweredFragments,
-    /// Whether the mailbox to us held something when the last fragment was written; `None`: not known, or looked into since.
+    /// True if the mailbox to us held something when the last fragment was written; `None`: not known, or looked into since.
     holds: Option<bool>,
     full_pause: FullPause,
     /// Its NetId, for AoE.
@@ -384,7 +384,7 @@ impl Multiplexer {
         true
     }
 
-    /// The same, unless nothing was there when the last fragment was written.
+    /// Fetches and hands on what is there, unless nothing was when the last fragment was written.
     pub(crate) async fn drain_unless_empty(&mut self) {
         if self.holds != Some(false) {
             self.drain().await;

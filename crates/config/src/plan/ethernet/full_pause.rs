@@ -16,11 +16,11 @@ const LONGEST: Span = Span::ms(10);
 /// Interval at which a SubDevice takes fragments, as far as it is learnt.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct FullPause {
-    /// From one fragment that is taken to the next.
+    /// Time from one fragment that is taken to the next.
     interval: Span,
-    /// When the last one was taken.
+    /// Time when the last one was taken.
     taken: Instant,
-    /// How often the one that waits found the mailbox full.
+    /// Tries at which the one that waits found the mailbox full.
     refusals: u32,
 }
 
@@ -31,7 +31,7 @@ impl Default for FullPause {
 }
 
 impl FullPause {
-    /// The mailbox was full at `now`: how long to wait before the next try.
+    /// Notes that the mailbox was full at `now`, and gives the pause before the next try.
     pub fn refused(&mut self, now: Instant) -> Span {
         let step = part(self.interval, 1, 4);
         self.refusals = self.refusals.saturating_add(1);
@@ -49,7 +49,7 @@ impl FullPause {
         }
     }
 
-    /// The fragment was taken at `now`.
+    /// Notes that the fragment was taken at `now`.
     pub fn accepted(&mut self, now: Instant) {
         // The first try after a pause may have come later than it could. The interval shrinks more slowly than it grows: one of
         // eight fragments or so takes a try more.
@@ -60,7 +60,7 @@ impl FullPause {
     }
 }
 
-/// So many parts of a span out of so many.
+/// A part of a span: `of` out of `all`.
 fn part(span: Span, of: u64, all: u64) -> Span {
     Span::ns(span.as_nanos() * of / all)
 }
@@ -71,7 +71,7 @@ mod tests {
 
     const FRAGMENTS: u64 = 1_000;
 
-    /// Tries that 1,000 fragments take at a SubDevice that takes one in so many µs, and the time of all.
+    /// Number of tries that 1,000 fragments take at a SubDevice that takes one in each interval, and the time of all.
     fn tries(interval: Span) -> (u64, Span) {
         let (mut pause, mut now, mut free, mut count) =
             (FullPause::default(), Instant::ZERO, Instant::ZERO, 0);

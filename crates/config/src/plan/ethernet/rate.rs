@@ -167,8 +167,8 @@ impl PlayedWire {
         Self { cyclic, next: 0, held: 0, left: 0, way, begin, end, count: 0, told_full: None }
     }
 
-    /// Datagrams of procedures of so many bytes are ready to leave, in one frame where the time until the next cycle has room
-    /// for it: when they have passed the SubDevices, if that is before the end.
+    /// Sends datagrams of procedures of so many bytes that are ready at `now`, in one frame where the time until the next
+    /// cycle has room for it. Gives the time at which they have passed the SubDevices, if that is before the end.
     fn send(&mut self, mut now: u64, mut datagrams: &[usize]) -> Option<u64> {
         let shortest = wire_time(MIN_LEN).as_nanos();
         let mut back = None;
