@@ -6,7 +6,7 @@
 mod fetch;
 
 use linesman_config::plan::DevicePlan;
-use linesman_config::plan::ethernet::FullPause;
+use linesman_config::plan::ethernet::{FullPause, MAILBOX_STATUSES};
 use linesman_proto::address::{DeviceId, RegisterAddress};
 use linesman_proto::ads::AmsNetId;
 use linesman_proto::mailbox::coe::Message as CoeMessage;
@@ -27,8 +27,6 @@ use crate::executor::wire::Exchanging;
 const OUT: u16 = 0;
 const IN: u16 = 1;
 const STATUS_AT: u16 = 5;
-/// Bytes of registers from the status of SyncManager 0 to that of SyncManager 1, with both.
-const BOTH_STATUSES: u16 = SYNC_MANAGER.len + 1;
 const FIRST_POLL: Span = Span::us(500);
 const SLOWEST_POLL: Span = Span::ms(10);
 /// A mailbox whose bit the cycle reads is looked into all the same once in so long while an answer is
@@ -320,7 +318,7 @@ impl Multiplexer {
 
     /// Reads the statuses of both SyncManagers, behind what was submitted before.
     fn read_statuses(&self) -> Exchanging {
-        self.wire.submit(Request::read(self.target, byte_of(OUT, STATUS_AT), BOTH_STATUSES))
+        self.wire.submit(Request::read(self.target, byte_of(OUT, STATUS_AT), MAILBOX_STATUSES))
     }
 
     /// Notes whether the mailbox to us holds something, and says whether the other one is full; `None` where nobody answered.
@@ -328,7 +326,7 @@ impl Multiplexer {
         let reply = answer.ok().filter(Reply::answered);
         let full =
             |at| reply.as_ref().map(|reply| SmStatus(reply.bytes::<1>(at)[0]).mailbox_full());
-        self.holds = full(usize::from(BOTH_STATUSES) - 1);
+        self.holds = full(usize::from(MAILBOX_STATUSES) - 1);
         full(0)
     }
 

@@ -15,7 +15,7 @@ use super::{DevicePlan, Doubt, Plan, Severity};
 use crate::start_up::StartUpAction;
 
 pub use full_pause::FullPause;
-pub use rate::{ACYCLIC_FRAMES, EthernetRate, RateLimit};
+pub use rate::{ACYCLIC_FRAMES, EthernetRate, MAILBOX_STATUSES, RateLimit};
 pub use route::{EthernetRoute, RouteStep};
 pub use subnet::Subnet;
 

@@ -12,6 +12,7 @@ use linesman_proto::ethernet::{MAX_LEN, MIN_LEN};
 use linesman_proto::frame::size::{BYTE_NS, WIRE_OVERHEAD, frame_size, wire_time};
 use linesman_proto::mailbox::HEADER_LEN;
 use linesman_proto::mailbox::eoe::{EOE_HEADER_LEN, fragments};
+use linesman_proto::register::SYNC_MANAGER;
 use linesman_proto::time::{Instant, Span};
 
 use super::FullPause;
@@ -19,8 +20,9 @@ use crate::plan::{DevicePlan, Plan};
 
 /// Frames of procedures that leave in a cycle, at most.
 pub const ACYCLIC_FRAMES: usize = 4;
-/// Bytes with the statuses of both mailboxes, which are read in the frame of each message to a SubDevice.
-const STATUSES: usize = 9;
+/// Bytes of registers from the status of SyncManager 0 to that of SyncManager 1, with both: they are read in the frame of each
+/// fragment to a SubDevice, and tell which mailbox is full.
+pub const MAILBOX_STATUSES: u16 = SYNC_MANAGER.len + 1;
 /// The longest frame without a VLAN tag, in bytes.
 const FRAME: usize = 1_514;
 /// What of it is data of a TCP connection, in bytes: without the headers of Ethernet, IP and TCP.
@@ -71,7 +73,7 @@ impl EthernetRate {
     /// Data of a TCP connection from the SubDevice, in bytes a second, when every second segment is acknowledged:
     /// the frame of an acknowledgement is one mailbox message the other way, and takes one frame where a message from the
     /// SubDevice takes two. `None` in the other direction: no plan tells how soon a SubDevice acknowledges. With large
-    /// mailboxes and cycles below 1 ms it may be a quarter less: the time that the SubDevice takes for an acknowledgement is
+    /// mailboxes and cycles below 1 ms it may be some quarter less: the time that the SubDevice takes for an acknowledgement is
     /// left out.
     #[must_use]
     pub fn tcp_bytes_per_second(&self) -> Option<u64> {
@@ -225,7 +227,9 @@ impl PlayedWire {
         let (mut busy, mut waits) = (0, false);
         let mut pause = FullPause::default();
         loop {
-            let Some(written) = self.send(now, &[mailbox, STATUSES]) else { return self.count };
+            let Some(written) = self.send(now, &[mailbox, MAILBOX_STATUSES.into()]) else {
+                return self.count;
+            };
             now = written;
             if waits && busy <= written {
                 (busy, waits) = (busy + message_time.as_nanos(), false);
