@@ -317,8 +317,8 @@ fn with_same_source(
     found
 }
 
-/// Number of links from which on those that are hit in the same stretch of time have one source, even where hits are too few
-/// to show a rhythm that they share: so many cables do not fail at a time.
+/// Number of links from which on those that are hit in the same stretch of time are taken to have one source, even where hits
+/// are too few to show a rhythm that they share: so many cables seldom fail at a time.
 const MANY_LINKS: usize = 3;
 
 /// Links that one source hits are hit about as often: none more than this many times as often as another.

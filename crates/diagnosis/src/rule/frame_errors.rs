@@ -20,8 +20,8 @@
 //!   one direction that counts steadily to the sender's output or the receiver's input. While several
 //!   links count, a live diagnosis reads the counters of those devices every 5 ms: one source hits them in
 //!   the same bursts, and begins and ends for all of them together; two faults each go their own way. Three links or more
-//!   that are hit in the same stretch of time, and about as often, have one source in any case: so many cables do not
-//!   fail at a time.
+//!   that are hit in the same stretch of time, and about as often, are taken to have one source: so many cables
+//!   seldom fail at a time.
 //! * Bad frames with clean symbols (`H111`): the device before the port spoils frames inside, before
 //!   they are coded. Changing the cable will not help.
 //! * The way from the first SubDevice back to the card is checked by nobody but the card. If its own
