@@ -1,25 +1,26 @@
 """Linesman's own MainDevice, and a cable that spoils what comes back.
 
-2,000 cycles with each fault: exactly the faulty cycles are bad, what is doubled or stray costs none, each kind is counted
+800 cycles with each fault: exactly the faulty cycles are bad, what is doubled or stray costs none, each kind is counted
 under its own name, and the run goes on. A host that runs other programs beside brings frames late by itself: these, too, have
 to be counted as late, each of them once. Where it held a frame at the cable, or a cycle had to be left out, as many frames as
-that may be counted otherwise; on a host that did neither, none.
+that may be counted otherwise; on a host that did neither, none. A host that did so half as often as the fault has shown nothing.
 """
 
 import sys
 
 from bench import FAR, HERE, NEAR, Segment, inside, parse
-from harness import LINE, LINESMAN, WATCHDOG_MS, check, watchdogs_expired
+from harness import LINE, LINESMAN, WATCHDOG_MS, Spoiled, check, watchdogs_expired
 
-CYCLE_US, SETTLED, COUNTED = 8000, 200, 2000
+# A cycle so long that a busy host seldom sleeps through it, and four of them end before a watchdog expires.
+CYCLE_US, SETTLED, COUNTED, EVERY = 24_000, 40, 800, 20
 # A host that holds a frame for longer than most of a cycle has lost it by itself.
-LIMIT_MS = 5.0
+LIMIT_MS = 16.0
 # Both ends of a further cable, between what spoils and the segment.
 BEFORE, BEHIND = "veth8", "veth9"
 NAMES = ("frames_lost", "frames_late", "frames_duplicate", "frames_stray", "frames_truncated")
 
 
-def spoiled(line, fault, every):
+def spoiled(line, fault):
     """What Linesman counted, what the cable says it did, and how many watchdogs expired."""
     inside(line.far, "ip", "link", "add", BEFORE, "type", "veth", "peer", "name", BEHIND)
     for name in (BEFORE, BEHIND):
@@ -27,7 +28,7 @@ def spoiled(line, fault, every):
         inside(line.far, "ip", "link", "set", name, "up")
     seconds = (SETTLED + COUNTED) * CYCLE_US / 1e6 + 4
     cable = line.start(
-        line.far, sys.executable, HERE / "wire_faults.py", FAR, BEFORE, fault, every, SETTLED, COUNTED, LIMIT_MS,
+        line.far, sys.executable, HERE / "wire_faults.py", FAR, BEFORE, fault, EVERY, SETTLED, COUNTED, LIMIT_MS,
     )
     assert cable.stdout.readline().strip() == "ready"
     segment = Segment(line, LINESMAN, LINE.file, on=BEHIND)
@@ -44,16 +45,17 @@ def spoiled(line, fault, every):
     return report, told, expired
 
 
-def judge(line, fault, every, cycles_lost, **counted):
+def judge(line, fault, cycles_lost, **counted):
     """`cycles_lost`: whether a spoiled frame costs its cycle; `counted`: the names under which it is counted."""
-    report, told, expired = spoiled(line, fault, every)
-    counts, expected = report["counts"], COUNTED // every
+    report, told, expired = spoiled(line, fault)
+    counts, expected = report["counts"], COUNTED // EVERY
     assert told["cyclic"] > SETTLED + COUNTED, told
     assert told["spoiled"] == expected, told
     assert report["error"] is None and report["settled"], report
     # What the cable and the run say of the host, each of them once per frame or cycle.
     excused = told["held"] + counts["cycles_missed"]
-    assert excused <= COUNTED // 100, f"the host spoiled it by itself: {told}, {counts['cycles_missed']} cycles missed"
+    if excused > expected // 2:
+        raise Spoiled(f"{told}, {counts['cycles_missed']} cycles missed")
     latest_ms = report["lateness"]["max_ns"] / 1e6
     is_late = counts["cycles_missed"] == 0 or latest_ms > LIMIT_MS
     assert is_late, f"{counts['cycles_missed']} cycles missed, and none began more than {latest_ms:.1f} ms late"
@@ -61,9 +63,10 @@ def judge(line, fault, every, cycles_lost, **counted):
     wanted = {name: expected if name in counted else 0 for name in NAMES}
     # What the host brought late is lost for its cycle and comes after all.
     late = max(0, seen["frames_late"] - wanted["frames_late"])
-    assert late <= COUNTED // 10, f"the host spoiled it by itself: it brought {late} frames late"
-    is_short = late * CYCLE_US / 1e3 < WATCHDOG_MS or expired == 0
-    assert is_short, f"the host spoiled it by itself: it stood still for longer than a watchdog, {late} frames late"
+    if late > COUNTED // 10:
+        raise Spoiled(f"it brought {late} frames late")
+    if late * CYCLE_US / 1e3 >= WATCHDOG_MS and expired:
+        raise Spoiled(f"it stood still for longer than a watchdog, {late} frames late")
     wanted["frames_late"] += late
     wanted["frames_lost"] += late
     off = {name: seen[name] - wanted[name] for name in NAMES if abs(seen[name] - wanted[name]) > excused}
@@ -76,17 +79,17 @@ def judge(line, fault, every, cycles_lost, **counted):
 
 @check
 def doubled_frames_cost_no_cycle(line):
-    judge(line, "doubled", 50, False, frames_duplicate=True)
+    judge(line, "doubled", False, frames_duplicate=True)
 
 
 @check
 def frames_with_an_unknown_index_cost_no_cycle(line):
-    judge(line, "stray", 50, False, frames_stray=True)
+    judge(line, "stray", False, frames_stray=True)
 
 
 @check
 def truncated_frames_cost_their_cycle(line):
-    judge(line, "truncated", 50, True, frames_truncated=True)
+    judge(line, "truncated", True, frames_truncated=True)
 
 
 # What is cut off is malformed, and meant to be.
@@ -95,9 +98,9 @@ truncated_frames_cost_their_cycle.spoils_frames = True
 
 @check
 def lost_frames_cost_their_cycle(line):
-    judge(line, "lost", 50, True, frames_lost=True)
+    judge(line, "lost", True, frames_lost=True)
 
 
 @check
 def late_frames_cost_their_cycle(line):
-    judge(line, "late_by_10_ms", 500, True, frames_lost=True, frames_late=True)
+    judge(line, "late_by_30_ms", True, frames_lost=True, frames_late=True)

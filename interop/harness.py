@@ -24,6 +24,10 @@ class Skip(Exception):
     """Cannot be tried here."""
 
 
+class Spoiled(AssertionError):
+    """What the host did by itself, by the check's own count, hides what the check looks for."""
+
+
 def check(function):
     CHECKS.append(function)
     return function

@@ -8,7 +8,7 @@ TIMEOUTS = "it counts each frame that a foreign MainDevice loses, and those of i
 BRING_UP = "KickCAT and SOEM find no line when one of their first frames is late"
 CLIENT = "a foreign client that waits too short a time for a frame or a mailbox gives up for good, and says no more"
 SHORT_LOOK = "two seconds leave no time to ask again for what a stall left unread"
-EACH_FRAME = "each of 2,000 frames is judged by what the cable did to it, and the host may do the same"
+EACH_FRAME = "each of 800 frames is judged by what the cable did to it, and the host may do the same"
 
 RETRIED = {
     "every_frame_of_a_50_us_cycle_is_accounted_for": "20,000 frames a second leave no time to catch up on",

@@ -10,10 +10,12 @@ as many as LINESMAN_INTEROP_JOBS says, else one more than there are processors, 
 most of the time. What went over the cable while a check ran must be readable: tshark looks at each
 packet, and none may be missing but for the time in which the host stood still (`stalls.py`). A check that fails while the
 host stood still has shown nothing and is tried again, which its line tells: at once where `retried.py` names it, else
-when no other check runs any more; three times at most.
+when no other check runs any more; three times at most. A check that counts what the host did and says each time that this hid
+what it looks for is left out, with these words: nothing was shown, neither right nor wrong.
 """
 
 import concurrent.futures
+import dataclasses
 import importlib
 import os
 import shutil
@@ -22,7 +24,7 @@ import time
 import traceback
 
 from bench import HERE, Bench, Capture
-from harness import CHECKS, Skip
+from harness import CHECKS, Skip, Spoiled
 from retried import RETRIED
 from skipped import SKIPPED
 from stalls import Host, Stalls, Waits
@@ -62,68 +64,80 @@ def captured(function, line):
     return f"{count} of {passed} packets captured, the host stood still for {stood:.0f} ms, none malformed"
 
 
+@dataclasses.dataclass
+class Attempt:
+    """How a check went once."""
+
+    result: str  # ok, FAIL or skip
+    why: str
+    # For how long the host stood still in it, in milliseconds, where that excuses a failure.
+    excuse_ms: float = 0.0
+    # The check itself counted that the host hid what it looks for.
+    is_spoiled: bool = False
+
+    @property
+    def is_excused(self):
+        return self.result == "FAIL" and (self.excuse_ms > 0 or self.is_spoiled)
+
+
+def told(function, attempts):
+    """The line that tells how a check went."""
+    *before, last = attempts
+    result, why = last.result, last.why
+    if all(one.is_spoiled for one in attempts):
+        result, why = "skip", f"not judged, {why}"
+    whys = [f"tried again, as the host stood still for {one.excuse_ms:.0f} ms: {one.why}" for one in before]
+    return "; ".join([f"{result} {function.__name__}: {why}", *whys])
+
+
 def tried(function, stalls):
-    """The line that tells how a check went, and whether a stall of the host excuses that it failed."""
-    before = []
-    while True:
-        told, excuse_ms = once(function, stalls, before)
-        may_be_retried = function.__name__ in RETRIED and len(before) + 1 < ATTEMPTS
-        if not told.startswith("FAIL"):
-            return told, False
-        if not may_be_retried or excuse_ms == 0:
-            return "; ".join([told, *before]), excuse_ms > 0
-        before.append(f"tried again, as the host stood still for {excuse_ms:.0f} ms: {why(function, told)}")
+    """The attempts at a check until one counts."""
+    attempts = [once(function, stalls)]
+    while function.__name__ in RETRIED and attempts[-1].is_excused and len(attempts) < ATTEMPTS:
+        attempts.append(once(function, stalls))
+    return attempts
 
 
-def tried_alone(function, stalls, told):
-    """The line that tells how a check went that failed while the host stood still, now that no other one runs."""
-    before = []
+def tried_alone(function, stalls, attempts):
+    """The attempts at a check that failed while the host stood still, now that no other one runs."""
     for _ in range(ATTEMPTS):
-        before.append(f"tried again alone, as the host stood still: {why(function, told)}")
-        told, excuse_ms = once(function, stalls, before)
-        if not told.startswith("FAIL"):
-            return told
-        if excuse_ms == 0:
+        attempts = [*attempts, once(function, stalls)]
+        if not attempts[-1].is_excused:
             break
-    return "; ".join([told, *before])
+    return attempts
 
 
-def why(function, told):
-    """The reason that the line of a failed check gives."""
-    return told.splitlines()[0].removeprefix(f"FAIL {function.__name__}: ")
-
-
-def once(function, stalls, before):
-    """The line that tells how one attempt went, and why those before it did not count; for how long the host stood still in
-    it, in milliseconds, where that excuses a failure."""
-    name, start = function.__name__, time.monotonic()
-    host = None
+def once(function, stalls):
+    start, host = time.monotonic(), None
     try:
         with Bench() as line, Waits(line.running) as waits:
             host = line.host = Host(stalls, waits)
-            note = "; ".join([captured(function, line), *line.notes, *before])
-        told = f"ok {name}: {note}, {time.monotonic() - start:.1f} s"
-    except Skip as why:
-        told = f"skip {name}: {why}"
+            note = "; ".join([captured(function, line), *line.notes])
+        return Attempt("ok", f"{note}, {time.monotonic() - start:.1f} s")
+    except Skip as error:
+        return Attempt("skip", str(error))
+    except Spoiled as error:
+        why = f"the host spoiled it by itself: {error}, {time.monotonic() - start:.1f} s"
+        return Attempt("FAIL", why, host.excuse_ms(start), True)
     except (AssertionError, RuntimeError) as error:
-        told = f"FAIL {name}: {type(error).__name__}: {error}, {time.monotonic() - start:.1f} s"
+        why = f"{type(error).__name__}: {error}, {time.monotonic() - start:.1f} s"
     except Exception as error:
-        told = f"FAIL {name}: {type(error).__name__}: {error}\n{traceback.format_exc()}"
-    return told, host.excuse_ms(start) if host else 0.0
+        why = f"{type(error).__name__}: {error}\n{traceback.format_exc()}"
+    return Attempt("FAIL", why, host.excuse_ms(start) if host else 0.0)
 
 
 def together(checks, jobs, stalls, tell):
-    """Runs checks beside each other and tells how they went; gives those that a stall excuses, with their lines."""
+    """Runs checks beside each other and tells how they went; gives those that a stall excuses, with their attempts."""
     excused = []
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         running = {pool.submit(tried, one, stalls): one for one in checks}
         try:
             for done in concurrent.futures.as_completed(running):
-                told, is_excused = done.result()
-                if is_excused:
-                    excused.append((running[done], told))
+                attempts = done.result()
+                if attempts[-1].is_excused:
+                    excused.append((running[done], attempts))
                 else:
-                    tell(told)
+                    tell(running[done], attempts)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
@@ -141,13 +155,14 @@ def main():
     counts = {"ok": 0, "FAIL": 0, "skip": 0}
     stalls = Stalls()
 
-    def tell(told):
-        counts[told.split()[0]] += 1
-        print(told, flush=True)
+    def tell(function, attempts):
+        line = told(function, attempts)
+        counts[line.split()[0]] += 1
+        print(line, flush=True)
 
     try:
-        for function, told in together(checks, jobs, stalls, tell):
-            tell(tried_alone(function, stalls, told))
+        for function, attempts in together(checks, jobs, stalls, tell):
+            tell(function, tried_alone(function, stalls, attempts))
     finally:
         stalls.end()
     if not wanted:

@@ -1,7 +1,7 @@
 """Sits in a cable and spoils what comes back: `wire_faults.py NEAR FAR FAULT EVERY FROM COUNT LIMIT_MS`.
 
 Frames go from NEAR to FAR as they are. Of the frames with process data that come back, those FROM to FROM + COUNT are
-counted, and every EVERYth of them suffers FAULT: doubled, stray, truncated, lost or late_by_10_ms. At SIGINT it prints how many it
+counted, and every EVERYth of them suffers FAULT: doubled, stray, truncated, lost or late_by_30_ms. At SIGINT it prints how many it
 spoiled, and how often the host itself held a frame for longer than LIMIT_MS, so that a check on a busy host knows what
 it cannot blame on anybody.
 """
@@ -17,7 +17,8 @@ import time
 
 ETHERCAT = 0x88A4
 LOGICAL = (10, 11, 12)
-LATE_S = 0.010
+# More than a cycle of those who use it.
+LATE_S = 0.030
 # Behind so many bytes a truncated frame ends: amid the data of its first datagram.
 CUT = 30
 
@@ -112,7 +113,7 @@ class Cable:
     def lost(self, _):
         pass
 
-    def late_by_10_ms(self, frame):
+    def late_by_30_ms(self, frame):
         heapq.heappush(self.late, (time.monotonic() + LATE_S, self.spoiled, frame))
 
     def told(self):
