@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use linesman_config::eni::Eni;
 use linesman_config::plan::PlannedExchange;
@@ -182,6 +182,16 @@ pub(crate) fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
         return Err(Failure::new(reason, "name a file in a folder that is there, or make it"));
     }
     Ok(())
+}
+
+/// Refuses captures that are read as one recording where one of them is no file: each is read twice.
+pub(crate) fn refuse_what_is_no_file(paths: &[PathBuf]) -> Result<(), Failure> {
+    let Some(path) = paths.iter().find(|path| !path.is_file()) else { return Ok(()) };
+    let reason = format!(
+        "{}: this is no file, and a recording in several parts is read from files",
+        path.display()
+    );
+    Err(Failure::new(reason, "name the files of one recording"))
 }
 
 /// Writes a text file that is not there yet.

@@ -93,6 +93,66 @@ fn network_of_a_ring_is_surveyed_from_captures_of_both_cards() {
 }
 
 #[test]
+fn frames_of_both_cards_are_listed_filtered_exported_and_told_in_the_order_of_their_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"I1.B-O1.A\"\nfrom_ms = 1500\n";
+    let (both, [a, b]) = recorded(folder.path(), cut);
+    let told = |arguments: &[&str]| {
+        let run = linesman([&["capture"], arguments].concat());
+        assert_eq!(run.status, 0, "{}", run.all());
+        run.stdout
+    };
+    // The order of frames of one time is that of the files: all else is as in one file.
+    let rows = |arguments: &[&str]| {
+        let text = told(&[&["list", "--json"], arguments].concat());
+        let rows: Vec<Value> =
+            text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+        let part = |row: &Value, name: &str| row[name].as_u64().unwrap();
+        assert!(rows.is_sorted_by_key(|row| part(row, "frame")));
+        let is_sorted = rows.is_sorted_by_key(|row| part(row, "time_ns"));
+        let mut shown: Vec<(u64, u64, String)> = rows
+            .iter()
+            .map(|row| {
+                let what = ["way", "index", "command", "adp", "ado", "logical", "wkc"]
+                    .map(|name| &row[name]);
+                (part(row, "time_ns"), part(row, "interface"), format!("{what:?}"))
+            })
+            .collect();
+        shown.sort();
+        (is_sorted, shown)
+    };
+    let one = rows(&[&both]);
+    assert!(one.0 && one.1.len() > 1000);
+    assert!(rows(&["--together", &a, &b]) == one, "the frames differ");
+    // Without it the second file follows the first one.
+    assert!(!rows(&[&a, &b]).0);
+    let counted = |arguments: &[&str]| {
+        let text = told(&[&["filter", "--json"], arguments].concat());
+        serde_json::from_str::<Value>(&text).unwrap()["matched"].as_u64().unwrap()
+    };
+    let returns = "ecat.cmd == \"LRW\" && ecat.cnt == 3";
+    assert!(counted(&[&both, returns]) > 100);
+    assert_eq!(counted(&["--together", &a, &b, returns]), counted(&[&both, returns]));
+    let happened = |arguments: &[&str]| {
+        let text = told(&[&["timeline", "--json"], arguments].concat());
+        let events = serde_json::from_str::<Value>(&text).unwrap()["events"].clone();
+        let events = events.as_array().unwrap().iter();
+        events
+            .map(|one| format!("{} {} {}", one["at_ns"], one["no"], one["text"]))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(happened(&["--together", &a, &b]), happened(&[&both]));
+    let [whole, merged] = ["whole.csv", "merged.csv"].map(|name| {
+        let path = folder.path().join(name).display().to_string();
+        let files =
+            if name == "whole.csv" { vec![both.as_str()] } else { vec!["--together", &a, &b] };
+        told(&[&["export", "--csv", &path], files.as_slice()].concat());
+        std::fs::read_to_string(path).unwrap().lines().count()
+    });
+    assert_eq!(whole, merged);
+}
+
+#[test]
 fn halves_of_an_open_ring_are_told_with_their_times() {
     let folder = tempfile::tempdir().unwrap();
     let cut = "[[fault]]\nkind = \"link-open\"\nat = \"I1.B-O1.A\"\nfrom_ms = 1500\n";
@@ -135,9 +195,13 @@ fn ring_that_stays_closed_has_no_halves_and_a_line_is_none() {
 fn files_that_are_no_recording_together_are_refused_with_the_next_step() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("not-there.pcapng").display().to_string();
-    let run = linesman(["diagnose", "--together", &path, &path]);
-    assert_eq!(run.status, 2, "{}", run.all());
-    assert!(run.stderr.contains("--together takes capture files"), "{}", run.stderr);
+    for command in
+        [&["diagnose"][..], &["capture", "info"], &["capture", "list"], &["capture", "timeline"]]
+    {
+        let run = linesman([command, &["--together", &path, &path]].concat());
+        assert_eq!(run.status, 2, "{}", run.all());
+        assert!(run.stderr.contains("not-there.pcapng: this is no file"), "{}", run.stderr);
+    }
     let run = linesman(["capture", "info", "before.pcapng", "after.pcapng"]);
     assert_eq!(run.status, 2, "{}", run.all());
     assert!(run.stderr.contains("add --together"), "{}", run.stderr);

@@ -2,6 +2,7 @@
 
 use linesman_capture::comparison::{ChangeReport, ComparisonReport, Tendency, compare};
 
+use super::source::FileTimes;
 use super::survey::{Surveyed, survey};
 use crate::command::diagnose::tap::TapArguments;
 use crate::command::line_access;
@@ -32,8 +33,9 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let stop = line_access::stop()?;
     let one = std::slice::from_ref::<String>;
     let by_card = TapArguments::default();
-    let before = survey(one(&arguments.before), false, &by_card, None, &stop, output)?;
-    let after = survey(one(&arguments.after), false, &by_card, None, &stop, output)?;
+    let times = FileTimes { together: false };
+    let before = survey(one(&arguments.before), times, &by_card, None, &stop, output)?;
+    let after = survey(one(&arguments.after), times, &by_card, None, &stop, output)?;
     let diagnosis = |one: &Surveyed| one.engine.diagnosis();
     let found = compare((&before.report, &diagnosis(&before)), (&after.report, &diagnosis(&after)));
     let status = if found.changes.is_empty() { Status::Good } else { Status::Findings };

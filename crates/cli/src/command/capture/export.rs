@@ -10,7 +10,7 @@ use linesman_diagnosis::report::FindingReport;
 use linesman_proto::time::Instant;
 
 use self::table::DatagramTable;
-use super::source::{LearnedCapture, RowSource, ShownFrame};
+use super::source::{FileTimes, LearnedCapture, RowSource, ShownFrame};
 use super::writer::CaptureSink;
 use crate::command::diagnose::tap::TapArguments;
 use crate::exit::Status;
@@ -24,7 +24,7 @@ use crate::text::quantity::count;
 #[derive(clap::Args, Debug)]
 #[command(group = clap::ArgGroup::new("form").required(true).multiple(true).args(["csv", "parquet", "pcapng"]))]
 pub(super) struct Arguments {
-    /// The capture; several are parts of one recording
+    /// The capture; several are parts of one recording, one after the other
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// Write a table with one row for each datagram
@@ -44,6 +44,8 @@ pub(super) struct Arguments {
     project: Option<PathBuf>,
     #[command(flatten)]
     tap: TapArguments,
+    #[command(flatten)]
+    times: FileTimes,
 }
 
 /// Does what was asked.
@@ -51,7 +53,12 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for path in [&arguments.csv, &arguments.parquet, &arguments.pcapng].into_iter().flatten() {
         files::refuse_to_overwrite(path)?;
     }
-    let source = RowSource::of(&arguments.files, arguments.project.as_ref(), &arguments.tap)?;
+    let source = RowSource::of(
+        &arguments.files,
+        arguments.times,
+        arguments.project.as_ref(),
+        &arguments.tap,
+    )?;
     let learned = source.learn(output)?;
     let mut comments = Comments::of(&learned);
     let findings = comments.count();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use linesman_capture::expression::{FIELDS, FieldReference, like, like_datagrams};
 use serde::Serialize;
 
-use super::source::{LearnedCapture, Passed, RowSource, ShownFrame};
+use super::source::{FileTimes, LearnedCapture, Passed, RowSource, ShownFrame};
 use super::writer::CaptureSink;
 use crate::command::diagnose::tap::TapArguments;
 use crate::exit::Status;
@@ -47,6 +47,8 @@ pub(crate) struct Arguments {
     project: Option<PathBuf>,
     #[command(flatten)]
     tap: TapArguments,
+    #[command(flatten)]
+    times: FileTimes,
     /// List the fields that a condition can name
     #[arg(long, exclusive = true)]
     fields: bool,
@@ -109,7 +111,8 @@ fn filter(
     condition: &str,
     output: &mut Output,
 ) -> Result<Status, Failure> {
-    let source = RowSource::of(&paths(words), arguments.project.as_ref(), &arguments.tap)?;
+    let source =
+        RowSource::of(&paths(words), arguments.times, arguments.project.as_ref(), &arguments.tap)?;
     let mut learned: Option<LearnedCapture> = None;
     let expression = source.condition(condition, &mut learned, output)?;
     let devices = learned.as_ref().map(|learned| &learned.devices);
@@ -174,8 +177,12 @@ fn filter(
 
 /// The condition that frames like one meet.
 fn like_frame(arguments: &Arguments, number: u64, output: &mut Output) -> Result<Status, Failure> {
-    let source =
-        RowSource::of(&paths(&arguments.words), arguments.project.as_ref(), &arguments.tap)?;
+    let source = RowSource::of(
+        &paths(&arguments.words),
+        arguments.times,
+        arguments.project.as_ref(),
+        &arguments.tap,
+    )?;
     let reference = arguments.field.as_deref().map(field).transpose()?;
     let is_needed = reference.is_some_and(|reference| reference.field.needs_whole());
     let learned = if is_needed { Some(source.learn(output)?) } else { None };

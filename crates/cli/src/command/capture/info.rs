@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use linesman_capture::network::report::ProbePortReport;
 
+use super::source::FileTimes;
 use super::survey::survey;
 use crate::command::diagnose::tap::TapArguments;
 use crate::command::line_access;
@@ -18,10 +19,8 @@ pub(crate) struct Arguments {
     /// The capture; several are the files of a ring of files, or with --together files of the same time
     #[arg(value_name = "FILE", required = true)]
     places: Vec<String>,
-    /// The files were recorded at the same time, as at the two cards of a ring or on the two ways of a tap: their frames
-    /// are put in the order of their times
-    #[arg(long)]
-    together: bool,
+    #[command(flatten)]
+    times: FileTimes,
     #[command(flatten)]
     tap: TapArguments,
     /// Device descriptions of makers (ESI) that name the types of SubDevices: a folder of XML files, or one
@@ -38,8 +37,8 @@ pub(crate) struct Arguments {
 /// Tells what the network is. That judges nothing: the exit status is 0 once EtherCAT frames were found.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let stop = line_access::stop()?;
-    let Arguments { places, together, tap, esi, .. } = arguments;
-    let surveyed = survey(places, *together, tap, esi.as_deref(), &stop, output)?;
+    let Arguments { places, times, tap, esi, .. } = arguments;
+    let surveyed = survey(places, *times, tap, esi.as_deref(), &stop, output)?;
     if arguments.json {
         output.json(&surveyed.report);
         return Ok(Status::Good);

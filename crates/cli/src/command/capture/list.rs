@@ -10,7 +10,7 @@ use linesman_proto::address::RegisterAddress;
 use linesman_proto::register::describe;
 use serde::Serialize;
 
-use super::source::{LearnedCapture, RowSource, ShownFrame};
+use super::source::{FileTimes, LearnedCapture, RowSource, ShownFrame};
 use crate::amount;
 use crate::command::diagnose::tap::TapArguments;
 use crate::exit::Status;
@@ -26,7 +26,7 @@ const FIRST_RAM: u16 = 0x1000;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// The capture; several are parts of one recording. `-` is standard input
+    /// The capture; several are parts of one recording, one after the other. `-` is standard input
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     /// How times are shown
@@ -46,6 +46,8 @@ pub(crate) struct Arguments {
     project: Option<PathBuf>,
     #[command(flatten)]
     tap: TapArguments,
+    #[command(flatten)]
+    times: FileTimes,
     /// JSON, one object for each row, schema linesman.capture-row/1
     #[arg(long)]
     pub(crate) json: bool,
@@ -78,7 +80,12 @@ pub(crate) struct RowReport {
 /// Does what was asked.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let json = arguments.json;
-    let source = RowSource::of(&arguments.files, arguments.project.as_ref(), &arguments.tap)?;
+    let source = RowSource::of(
+        &arguments.files,
+        arguments.times,
+        arguments.project.as_ref(),
+        &arguments.tap,
+    )?;
     let mut learned: Option<LearnedCapture> = match arguments.names {
         true => Some(source.learn(output)?),
         false => None,

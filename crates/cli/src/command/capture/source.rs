@@ -15,7 +15,7 @@ use crate::command::diagnose::capture::skipped;
 use crate::command::diagnose::tap::{TapArguments, TapLinks};
 use crate::command::service::address::{DeviceNames, find_all};
 use crate::failure::Failure;
-use crate::files::Planned;
+use crate::files::{Planned, refuse_what_is_no_file};
 use crate::output::{Output, Progress};
 use crate::text::finding::percent;
 use crate::text::names::Names;
@@ -24,9 +24,19 @@ use crate::text::quantity::count;
 /// Between two looks at the clock: some tens of milliseconds.
 const FRAMES_BETWEEN_LOOKS: u64 = 32_768;
 
+/// Times of several files.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub(super) struct FileTimes {
+    /// The files were recorded at the same time, as at the two cards of a ring or on the two ways of a tap: their frames
+    /// are put in the order of their times, and are numbered in it
+    #[arg(long)]
+    pub(super) together: bool,
+}
+
 /// Files that the frames come from.
 pub(super) struct RowSource {
     files: Vec<PathBuf>,
+    times: FileTimes,
     planned: Option<Planned>,
     /// Links at which they were recorded inside the line.
     tap: Option<TapLinks>,
@@ -57,9 +67,11 @@ pub(super) struct ShownFrame<'s, 'a> {
 }
 
 impl RowSource {
-    /// The files as they were named; several are parts of one recording.
+    /// The files as they were named; several are parts of one recording, one after the other unless `times` says that they
+    /// are of the same time.
     pub(super) fn of(
         files: &[PathBuf],
+        times: FileTimes,
         project: Option<&PathBuf>,
         tap: &TapArguments,
     ) -> Result<Self, Failure> {
@@ -68,9 +80,12 @@ impl RowSource {
             let reason = "standard input beside other files: its frames have no place among theirs";
             return Err(Failure::new(reason, "name files alone, or `-` alone"));
         }
+        if times.together && files.len() > 1 {
+            refuse_what_is_no_file(files)?;
+        }
         let planned = project.map(|path| Planned::open(path)).transpose()?;
         let tap = tap.links(planned.as_ref().map(|planned| &planned.project))?;
-        Ok(Self { files: files.to_vec(), planned, tap })
+        Ok(Self { files: files.to_vec(), times, planned, tap })
     }
 
     /// The names, for messages.
@@ -85,6 +100,7 @@ impl RowSource {
                 let input = Input::open(one).map_err(linesman_link::capture::CaptureError::from)?;
                 Capture::of(frames(input)?)?
             }
+            several if self.times.together => Capture::side_by_side(several)?,
             several => Capture::of_files(several)?,
         };
         Ok(match &self.tap {

@@ -14,11 +14,13 @@ use linesman_runtime::plan_file::library::Library;
 use linesman_runtime::selector::Selector;
 use linesman_runtime::stop::Stop;
 
+use super::source::FileTimes;
 use crate::command::bundle::frames;
 use crate::command::diagnose::capture::{nothing_seen, read};
 use crate::command::diagnose::tap::{TapArguments, TapLinks};
 use crate::command::diagnose::{names, ring};
 use crate::failure::Failure;
+use crate::files;
 use crate::output::Output;
 use crate::text::names::Names;
 use crate::text::quantity::count;
@@ -34,11 +36,11 @@ pub(super) struct Surveyed {
     pub(super) names: Names,
 }
 
-/// Reads a capture; several files are one recording, `together` those of the same time. `tap` is where it was taken inside the
+/// Reads a capture; several files are one recording, one after the other unless `times` says otherwise. `tap` is where it was taken inside the
 /// line, `esi` where device descriptions are that name types.
 pub(super) fn survey(
     places: &[String],
-    together: bool,
+    times: FileTimes,
     tap: &TapArguments,
     esi: Option<&Path>,
     stop: &Stop,
@@ -50,7 +52,7 @@ pub(super) fn survey(
             let input = open(place, stop)?;
             (input.name().to_owned(), Capture::of(input)?)
         }
-        several => (PathBuf::from(several.join(" + ")), open_several(several, together)?),
+        several => (PathBuf::from(several.join(" + ")), open_several(several, times)?),
     };
     let tap = tap.links(None)?;
     if let Some(tap) = &tap {
@@ -112,9 +114,10 @@ fn no_end_mark() -> UnknownReport {
 }
 
 /// The files of one recording.
-fn open_several(places: &[String], together: bool) -> Result<Capture, Failure> {
+fn open_several(places: &[String], times: FileTimes) -> Result<Capture, Failure> {
     let paths: Vec<PathBuf> = places.iter().map(PathBuf::from).collect();
-    if together {
+    if times.together {
+        files::refuse_what_is_no_file(&paths)?;
         return Ok(Capture::side_by_side(&paths)?);
     }
     if !ring::is_ring(places) {

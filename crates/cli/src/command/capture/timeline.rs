@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use linesman_capture::timing::timeline::{TimelineReport, timeline};
 
+use super::source::FileTimes;
 use super::survey::survey;
 use crate::command::diagnose::tap::TapArguments;
 use crate::command::line_access;
@@ -18,9 +19,11 @@ use crate::text::quantity::time;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 pub(crate) struct Arguments {
-    /// The capture
-    #[arg(value_name = "FILE")]
-    place: String,
+    /// The capture; several are the files of a ring of files, or with --together files of the same time
+    #[arg(value_name = "FILE", required = true)]
+    places: Vec<String>,
+    #[command(flatten)]
+    times: FileTimes,
     #[command(flatten)]
     tap: TapArguments,
     /// Only trouble: errors, working counters that are too low, refused transfers, gaps, findings
@@ -40,8 +43,8 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
         files::refuse_to_overwrite(path)?;
     }
     let stop = line_access::stop()?;
-    let places = std::slice::from_ref(&arguments.place);
-    let surveyed = survey(places, false, &arguments.tap, None, &stop, output)?;
+    let Arguments { places, times, tap, .. } = arguments;
+    let surveyed = survey(places, *times, tap, None, &stop, output)?;
     let mut told = timeline(&surveyed.report, &surveyed.engine.diagnosis());
     if arguments.trouble {
         told.events.retain(|event| event.trouble);

@@ -49,10 +49,7 @@ fn stem(place: &str) -> Option<String> {
 /// Judges the files as one capture.
 pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, Failure> {
     let paths: Vec<PathBuf> = arguments.places.iter().map(PathBuf::from).collect();
-    if let Some(place) = arguments.places.iter().find(|place| !Path::new(place).is_file()) {
-        let reason = format!("{place}: this is no file, and --together takes capture files");
-        return Err(Failure::new(reason, "name the files that were recorded at the same time"));
-    }
+    files::refuse_what_is_no_file(&paths)?;
     let selector = Selector::File(paths[0].clone());
     refuse_misplaced(arguments, &selector)?;
     for path in [&arguments.html, &arguments.svg].into_iter().flatten() {
