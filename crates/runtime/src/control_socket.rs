@@ -4,6 +4,8 @@
 //! is asked is done by the one thread that runs the line, between two frames. What may be asked, and
 //! what is answered, is the business of a [`Protocol`].
 
+mod long_line;
+
 use std::fs;
 use std::io::{self, BufRead as _, BufReader, Lines, Read as _, Write as _};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -18,6 +20,7 @@ use linesman_link::socket::WakeHandle;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use self::long_line::{SendTime, read_rest};
 use crate::part::guard;
 use crate::watched_file::WatchedFile;
 
@@ -27,7 +30,9 @@ pub(crate) const MOST: u64 = 64 * 1024;
 const LONG_ONES: usize = 4;
 /// Bytes that are read and thrown away behind a request that is too long.
 const DISCARD_MAX: u64 = 16 * 1024 * 1024;
-/// How long the other side may take to read an answer.
+/// Time for all of a long request: far more than 64 MiB take on a busy computer.
+const LONG_TIME: Duration = Duration::from_secs(30);
+/// How long the other side may take to read an answer, or to send the next part of a request.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Requests that may wait for the thread that does them.
 const WAITING: usize = 16;
@@ -337,10 +342,17 @@ impl<P: Protocol> Connection<P> {
                 return Ok(After::Unread);
             }
             // Whoever has begun may not keep others waiting.
-            stream.set_read_timeout(Some(PATIENCE))?;
-            let rest = P::LONGEST + 1 - line.len() as u64;
-            lines.take(rest).read_until(b'\n', &mut line)?;
-            stream.set_read_timeout(None)?;
+            let time = SendTime { pause: PATIENCE, whole: LONG_TIME };
+            if !read_rest(stream, lines, &mut line, P::LONGEST, time)? {
+                let (pause, whole) = (PATIENCE.as_secs(), LONG_TIME.as_secs());
+                let why = format!(
+                    "the request did not end: {} bytes of it came, expected all of it within {whole} s, without a pause of \
+                     {pause} s: send it anew",
+                    line.len()
+                );
+                self.refuse(stream, why)?;
+                return Ok(After::Unread);
+            }
         }
         if line.len() as u64 > P::LONGEST {
             self.refuse(stream, format!("the request is longer than {} bytes", P::LONGEST))?;
