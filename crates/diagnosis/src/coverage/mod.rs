@@ -184,6 +184,8 @@ pub enum Reason {
     FramesLost,
     /// The recording ended while frames were on their way, or with them.
     EndOpen,
+    /// Nothing was sent any more for a while before the end, where process data had been exchanged in a cycle.
+    EndsStill,
     /// Frames came back a second time.
     FramesDoubled,
     /// Frames passed, and the diagnosis was too slow to look at them.

@@ -13,6 +13,7 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
     compare_number(basis, &mut all);
     list_unanswered(basis, &mut all);
     compare_broadcasts(basis, &mut all);
+    list_stillness(basis, &mut all);
     all
 }
 
@@ -104,6 +105,23 @@ fn compare_broadcasts(basis: &Basis<'_>, all: &mut Assessment) {
         let gap = Gap::new(Reason::NumberUnknown, text).essential().step(basis.look_longer());
         all.lacks(Extent::InPart, gap);
     }
+}
+
+/// The time at the end in which nobody was asked any more.
+fn list_stillness(basis: &Basis<'_>, all: &mut Assessment) {
+    // Who drives the line itself ends when it was told to.
+    let Some(still) = basis.model.stillness().filter(|_| basis.input != InputKind::Driven) else {
+        return;
+    };
+    let text = format!(
+        "nothing was sent in the last {}, although process data had been exchanged every {} up to then",
+        still.lasted, still.cycle
+    );
+    let gap = Gap::new(Reason::EndsStill, text).essential().step(
+        "look at the link lamp of the MainDevice's card and at the MainDevice's own log: the card has lost its link, or the \
+         program has ended or stands still",
+    );
+    all.lacks(Extent::InPart, gap);
 }
 
 /// Whether a SubDevice was asked in vain, or is planned and nothing was seen of it.

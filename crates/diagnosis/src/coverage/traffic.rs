@@ -135,10 +135,10 @@ fn list_lost(basis: &Basis<'_>, all: &mut Assessment) {
 
 /// Frames that were on their way when a recording ended, or were lost just before.
 fn list_in_flight(basis: &Basis<'_>, all: &mut Assessment) {
-    let in_flight = &basis.model.traffic.in_flight;
-    let unsettled = in_flight.unsettled();
+    let recording = &basis.model.traffic.recording;
+    let unsettled = basis.model.traffic.in_flight.unsettled();
     // Who listens or drives looks on until the frames are due, and so does who notes when the recording ended.
-    if unsettled == 0 || basis.input != InputKind::Recorded || in_flight.is_end_known() {
+    if unsettled == 0 || basis.input != InputKind::Recorded || recording.is_end_known() {
         return;
     }
     let frames = if unsettled == 1 { "1 frame" } else { &format!("{unsettled} frames") };

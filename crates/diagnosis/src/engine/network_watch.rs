@@ -98,9 +98,7 @@ impl NetworkWatch {
         };
         if has_ended {
             pairing.finish(now, &mut settle);
-            if model.traffic.recording.last().is_some_and(|last| last < now) {
-                model.traffic.in_flight.record_known_end();
-            }
+            model.traffic.recording.record_end(now);
             questions.finish(now, &mut |exchange| learner.learn_answer(model, exchange));
         } else {
             pairing.expire(now, &mut settle);

@@ -25,6 +25,7 @@ pub mod search;
 pub mod set_up;
 pub mod sii_image;
 pub mod spell;
+pub mod stillness;
 pub mod terminal_bus;
 pub mod traffic;
 pub mod up_time;
@@ -62,6 +63,7 @@ pub use search::LoopWrite;
 pub use set_up::{ClockSetUp, SetUp};
 pub use sii_image::{Power, SiiImage};
 pub use spell::Spell;
+pub use stillness::Stillness;
 pub use terminal_bus::is_on_terminal_bus;
 pub use traffic::{Silence, Traffic};
 pub use up_time::UpTime;
@@ -352,6 +354,12 @@ impl NetworkModel {
         let answered = self.devices.iter().filter(|device| device.answered.is_some()).count();
         let traffic = &self.traffic;
         answered.max(usize::from(traffic.broadcasts.counted()))
+    }
+
+    /// The time at the end of the input in which nothing was sent any more.
+    #[must_use]
+    pub fn stillness(&self) -> Option<Stillness> {
+        Stillness::of(self)
     }
 
     /// The highest state that any controller was ever seen in.

@@ -17,6 +17,9 @@
 //! when frames come back. What was recorded meanwhile tells the same.
 //! A few frames that stay away between others that come back are no silence: a first cable that was open needs
 //! some tenths of a millisecond at least to carry frames again (IEEE 802.3, 24.3.4.4).
+//! A recording may show one lost request alone: once a card has lost its link, the system hands it no more frames, and none
+//! is recorded. A last request that did not come back, and nothing sent from then on until the recorder noted that it ended,
+//! is taken for that; `tcpdump -w` notes no end.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
 //! In a ring the frames of card B may come round untouched while those of card A, which SubDevices process,

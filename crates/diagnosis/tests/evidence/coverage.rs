@@ -108,3 +108,61 @@ fn a_link_that_came_up_meanwhile_was_away_before() {
     script.exchange(&[fprd(0x1003, 0x0110, &[0x97, 0x56])]);
     lacks(script, "had no link at first and has one now");
 }
+
+/// What is said when the input ends `after_ms` behind the last frame.
+fn ended(script: &mut Script, after_ms: u64) -> Diagnosis {
+    script.now += after_ms * 1_000_000;
+    script.finish();
+    script.engine.diagnosis()
+}
+
+#[test]
+fn line_on_which_nothing_is_sent_any_more_is_not_healthy() {
+    let said = |after_ms| {
+        let report = ended(&mut running(), after_ms);
+        (report.verdict, text(&report))
+    };
+    let (verdict, words) = said(2_000);
+    assert_eq!(verdict, Verdict::Inconclusive, "{words}");
+    let expected =
+        "nothing was sent in the last 2 s, although process data had been exchanged every 100 µs";
+    assert!(words.contains(expected), "{words}");
+    // A program may wait for a moment.
+    assert_eq!(said(200).0, Verdict::Healthy);
+}
+
+#[test]
+fn maindevice_that_has_taken_the_subdevices_out_of_op_may_end() {
+    let mut script = running();
+    cycles(&mut script);
+    for station in 0x1001..=0x1003 {
+        raise(&mut script, station, &[1]);
+    }
+    let report = ended(&mut script, 2_000);
+    assert!(!text(&report).contains("nothing was sent"), "{}", text(&report));
+}
+
+/// Code, cause and place of what is found where the last request does not come back, and nothing follows for 2 s.
+fn last_one_lost(script: &mut Script) -> Vec<String> {
+    cycles(script);
+    script.vanish(&[lrw(PROCESS, 4, ALL)]);
+    let report = ended(script, 2_000);
+    report
+        .findings
+        .iter()
+        .map(|one| format!("{} {} at {}", one.code, one.cause, one.place))
+        .collect()
+}
+
+#[test]
+fn last_request_that_is_lost_before_a_stillness_is_the_card_without_a_link() {
+    assert_eq!(last_one_lost(&mut running()), ["H100 link-open at link MainDevice.A - 1.A"]);
+    // Where frames were lost all along, the last one is more of the same.
+    let mut noisy = running();
+    for _ in 0..4 {
+        noisy.vanish(&[lrw(PROCESS, 4, ALL)]);
+        cycles(&mut noisy);
+    }
+    let found = last_one_lost(&mut noisy);
+    assert!(!found.iter().any(|one| one.contains("H100")), "{found:?}");
+}

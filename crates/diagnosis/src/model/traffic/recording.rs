@@ -30,6 +30,8 @@ pub struct RecordedFrames {
     last_request: Option<Instant>,
     first: Option<Instant>,
     last: Option<Instant>,
+    /// For how long the input went on behind its last frame; `None` where that is not known.
+    still: Option<Span>,
     clock_back: Span,
     longest_gap: Span,
     quiet: VecDeque<Pause>,
@@ -99,6 +101,11 @@ impl RecordedFrames {
         }
     }
 
+    /// The input ended at `at`, as far as that is known.
+    pub(crate) fn record_end(&mut self, at: Instant) {
+        self.still = self.last.filter(|last| *last < at).map(|last| at.since(last));
+    }
+
     // ---- what rules ask ----
 
     /// EtherCAT frames seen, copies and both directions included; none without a line that was watched.
@@ -117,6 +124,18 @@ impl RecordedFrames {
     #[must_use]
     pub const fn last(&self) -> Option<Instant> {
         self.last
+    }
+
+    /// For how long the input is known to have gone on behind its last frame.
+    #[must_use]
+    pub const fn still(&self) -> Option<Span> {
+        self.still
+    }
+
+    /// True if it is known when the input ended, and not only when its last frame was.
+    #[must_use]
+    pub const fn is_end_known(&self) -> bool {
+        self.still.is_some()
     }
 
     /// True if any frame's direction was known for sure, as a live socket tells it.

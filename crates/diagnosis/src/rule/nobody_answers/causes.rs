@@ -1,6 +1,7 @@
 //! Causes of a silence, each with how likely it is.
 
 use linesman_config::fault::FaultName;
+use linesman_proto::address::DeviceId;
 use linesman_proto::time::Instant;
 
 use super::{PAGE, first_device, first_link, outage_location};
@@ -62,6 +63,15 @@ pub(super) fn cut(
             .or_at(FaultName::SupplyOff, Place::device(model.network, id), NEVER_SEEN),
         None => condition,
     }
+}
+
+/// Both cards of a ring have lost their links at once, and `id` hangs on both.
+pub(super) fn dark(model: &NetworkModel, at: Instant, id: DeviceId) -> Condition {
+    Condition::new(&PAGE, Place::device(model.network, id), FaultName::DeviceOff, at)
+        .confidence(0.6)
+        .or(FaultName::SupplyOff, 0.15)
+        .or_at(FaultName::NicDamaged, Place::Host, CARD)
+        .or_at(FaultName::LinkOpen, first_link(model), 0.05)
 }
 
 /// Where frames vanish was found by closing ports.

@@ -1,14 +1,14 @@
 //! Silences in which nothing came back, and what is said of them.
 
-use linesman_proto::address::Path;
+use linesman_proto::address::{DeviceId, Path};
 use linesman_proto::register::ErrorCounter;
 use linesman_proto::time::Span;
 use linesman_proto::topology::End;
 
-use super::{CERTAIN, FEW, advise, causes, first_end, restarted};
+use super::{CERTAIN, FEW, advise, causes, first_device, first_end, restarted};
 use crate::finding::{Condition, Evidence, Symptom};
 use crate::locate::LocateInput;
-use crate::model::{NetworkModel, Seen, Silence, Tally, search};
+use crate::model::{NetworkModel, Seen, Silence, Stillness, Tally, search};
 use crate::rule::View;
 
 /// More in a row than noise takes from a line that still answers.
@@ -43,9 +43,26 @@ fn is_long(view: &View<'_>, silence: &Silence) -> bool {
         None => {
             let is_few =
                 silence.frames >= FEW && view.has_ended && !is_among_others(view.model, silence);
-            silence.frames >= CERTAIN || is_few
+            silence.frames >= CERTAIN || is_few || stillness(view, silence).is_some()
         }
     }
+}
+
+/// The stillness behind a request that did not come back, and was the last frame of all. The system hands no frames to a card
+/// that has lost its link; of a program that was ended, the last request would have come back. Both cards of a ring lose
+/// theirs at once where one SubDevice hangs on both.
+fn stillness(view: &View<'_>, silence: &Silence) -> Option<Stillness> {
+    let model = view.model;
+    if silence.ended.is_some()
+        || is_among_others(model, silence)
+        || model.host.card(Path::A).carrier.is_some()
+    {
+        return None;
+    }
+    let closes_at = model.tree.as_ref().and_then(|tree| tree.closes_at());
+    let hangs_on_all =
+        closes_at.is_none_or(|(node, _)| first_device(model).map(DeviceId::index) == Some(node));
+    model.stillness().filter(|_| hangs_on_all)
 }
 
 /// Condition of a silence; none if it is damage that other rules place.
@@ -81,6 +98,8 @@ struct Outage<'v> {
     was_answered: bool,
     /// Link of the card, if that is known.
     carrier: Option<bool>,
+    /// The time behind it in which nothing was sent any more.
+    still: Option<Stillness>,
     /// Damaged frames that the card received meanwhile, if it did.
     spoiled: Option<Tally>,
     /// The link behind which frames vanish, if it was looked for and found.
@@ -99,6 +118,7 @@ impl<'v> Outage<'v> {
             silence,
             was_answered: model.traffic.datagrams.answered() > 0,
             carrier: carrier_during(model, &silence),
+            still: stillness(view, &silence),
             spoiled: Some(crc).filter(is_meanwhile),
             found: found_hole(model, &silence),
         }
@@ -117,6 +137,11 @@ impl<'v> Outage<'v> {
             (None, None, false) => {
                 let lasted = silence.last.at.since(since);
                 let carrier = self.carrier.filter(|_| lasted >= CARRIER_LATE);
+                let carrier = carrier.or(self.still.map(|_| false));
+                let closes = model.tree.as_ref().is_some_and(|tree| tree.closes_at().is_some());
+                if let Some(id) = first_device(model).filter(|_| closes && self.still.is_some()) {
+                    return causes::dark(model, since, id);
+                }
                 // A search that closed ports in vain leaves the first link.
                 causes::cut(model, since, carrier, search::began(model, silence).is_some())
             }
@@ -144,6 +169,14 @@ impl<'v> Outage<'v> {
                 condition = condition.shown_by(Evidence::frame(returned.at, frame, text));
             }
         }
+        if let Some(still) = self.still {
+            let text = format!(
+                "nothing was sent from then on, for {}, until the input ended: the system hands no frames to a card \
+                 that has lost its link (or the program of the MainDevice has ended just then)",
+                still.lasted
+            );
+            condition = condition.shown_by(Evidence::host(Some(self.silence.last.at), text));
+        }
         match self.carrier {
             Some(carrier) => condition.shown_by(self.link_of_card(carrier)),
             None => condition,
@@ -158,6 +191,8 @@ impl<'v> Outage<'v> {
             format!(
                 "from here on {frames} requests in a row came round as card B had sent them, and not as card A had"
             )
+        } else if self.was_answered && frames == 1 {
+            "this request did not come back, and is the last one".to_owned()
         } else if self.was_answered {
             format!("from here on {frames} requests in a row did not come back")
         } else {
@@ -183,7 +218,8 @@ impl<'v> Outage<'v> {
 
     /// Frames that are damaged on their way are missing, too, and a few in a row may be noise.
     const fn may_be_noise(&self) -> bool {
-        self.was_answered && (self.silence.ended.is_some() || self.silence.frames < LONG)
+        let is_short = self.silence.ended.is_some() || self.silence.frames < LONG;
+        self.was_answered && is_short && self.still.is_none()
     }
 
     fn linked(&self, condition: Condition) -> Condition {
