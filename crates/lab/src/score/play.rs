@@ -518,8 +518,8 @@ impl<'a> Play<'a> {
     /// What is said of the recording, if it ended here.
     fn recorded(&self) -> Diagnosis {
         let mut engine = self.recording.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        // A file ends with its last frame.
-        engine.finish(Instant::ZERO, true);
+        // Its recorder notes when it ended, as `--record`, `capture record` and dumpcap do.
+        engine.finish(self.lab.now(), true);
         engine.diagnosis()
     }
 
