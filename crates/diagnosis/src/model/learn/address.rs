@@ -202,23 +202,26 @@ impl Addresses {
         // Groups that come and go may be anywhere.
         let is_partial = is_partial || !model.optional.is_empty();
         let known = match (is_partial, &model.tree) {
-            (true, None) => self.named_here(answer).or_else(|| self.among_present(model, index)),
+            (true, None) => {
+                self.named_here(model, answer).or_else(|| self.among_present(model, index))
+            }
             (true, Some(_)) => model.by_position(position),
             (false, _) => self.order.get(index).copied(),
         };
         if known.is_some() {
             return known;
         }
-        let id = self.named_here(answer)?;
+        let id = self.named_here(model, answer)?;
         model.device_mut(id)?.position = Some(position);
         Some(id)
     }
 
     /// The controller whose station address is read or written by a datagram.
-    fn named_here(&self, answer: &Answer<'_>) -> Option<DeviceId> {
+    fn named_here(&self, model: &NetworkModel, answer: &Answer<'_>) -> Option<DeviceId> {
         let data = if answer.effect.reads { answer.reply.data() } else { answer.written() };
         let station = word_at(data, answer.ado, STATION).filter(|_| answer.sum > 0)?;
-        self.stations.get(StationAddress(station))
+        let station = StationAddress(station);
+        self.stations.get(station).or_else(|| planned_in_groups(model, station))
     }
 
     /// The controller at a place among those that are there, where some are not: those that are left keep their order.
@@ -252,6 +255,10 @@ impl Addresses {
         }
         self.count_planned(model, Some(station));
         if let Some(id) = self.stations.get(station) {
+            return Some(id);
+        }
+        if let Some(id) = planned_in_groups(model, station) {
+            self.give(model, id, station);
             return Some(id);
         }
         let by_number = self.by_number(model, station, MOST_BY_NUMBER);
@@ -414,4 +421,16 @@ impl Addresses {
         }
         model.touch();
     }
+}
+
+/// The controller that is planned with a station address and has none yet, on a line with groups that come and go: there
+/// positions tell nothing, and each MainDevice gives everybody the address that was planned.
+fn planned_in_groups(model: &NetworkModel, station: StationAddress) -> Option<DeviceId> {
+    if model.optional.is_empty() {
+        return None;
+    }
+    let is_it = |device: &&Device| {
+        device.station.is_none() && device.planned.is_some_and(|planned| planned.station == station)
+    };
+    model.devices.iter().find(is_it).map(|device| device.id)
 }
