@@ -79,6 +79,26 @@ fn answers_call_a_subdevice_by_name_and_type() {
 
 /// Labels say "SubDevice" where there is no name, so that nothing else has to.
 #[test]
+fn names_of_a_segment_go_to_their_subdevices_in_any_order_of_the_file() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("segment.toml");
+    // Frames reach what hangs on port B before what hangs on port C.
+    let rows =
+        [("K1", "EK1100", "maindevice"), ("Far", "EK1100", "K1.C"), ("Term", "EL6601", "K1.B")];
+    let devices = rows.map(|(name, kind, on)| {
+        format!("[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    });
+    fs::write(&path, devices.concat()).unwrap();
+    let on = format!("sim:{}", path.display());
+    let states = linesman(["state", &on]);
+    for row in ["2   0x1002   Term  EL6601", "3   0x1003   Far   EK1100"] {
+        assert!(states.stdout.contains(row), "{}", states.all());
+    }
+    let named = linesman(["sdo", &on, "Term", "read", "0x1018:02"]);
+    assert!(named.stdout.contains("0x19C93052"), "{}", named.all());
+}
+
+#[test]
 fn no_text_says_subdevice_before_a_label() {
     fn look(folder: &Path, found: &mut Vec<String>) {
         for entry in fs::read_dir(folder).unwrap() {

@@ -93,13 +93,14 @@ fn serve(
     Ok((segment, inventory, names))
 }
 
-/// The names of the file, if the line is as the file says: else they would be those of others.
+/// The names of the file in the order of processing, if the line is as the file says: else they would be those of others.
 fn names(lab: &Lab, inventory: &Inventory) -> Vec<String> {
     let devices = &lab.project().devices;
     if devices.len() != inventory.devices.len() {
         return Vec::new();
     }
-    devices.iter().map(|device| device.name.clone()).collect()
+    let found = (0..).map(DeviceId).take(devices.len());
+    found.map(|id| devices[lab.of_plan(id).index()].name.clone()).collect()
 }
 
 impl SegmentClient {
