@@ -168,6 +168,49 @@ fn bundle_of_planned_line_loses_the_names_of_its_project() {
 }
 
 #[test]
+fn bundle_of_a_line_with_groups_loses_their_names_and_can_be_judged() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let rows = [("K1", "EK1100", "maindevice"), ("B2", "EL1008", "K1.B"), ("X3", "EK1100", "K1.C")];
+    let devices = rows.map(|(name, kind, on)| {
+        format!("[[device]]\nname = \"{name}\"\ntype = \"{kind}\"\non = \"{on}\"\n")
+    });
+    let cut = "[[fault]]\nkind = \"link-open\"\nat = \"K1.B-B2.A\"\nfrom_ms = 2000\nto_ms = 3000\n";
+    fs::write(path("plant.toml"), devices.concat() + cut).unwrap();
+    let on = format!("sim:{}", path("plant.toml"));
+    let run = linesman(["scan", &on, "--save", &path("saved.toml")]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    let named = fs::read_to_string(path("saved.toml")).unwrap().replace("SubDevice", SECRET);
+    let group = format!(
+        "[[group]]\nname = \"{SECRET}-tool\"\nfirst = \"{SECRET} 3 (EK1100)\"\nplaces = [\"{SECRET} 1 (EK1100).C\"]\n\
+         identification = {{ by = \"serial\", value = {SERIAL} }}\noptional = true\n"
+    );
+    fs::write(path("project.toml"), named + &group).unwrap();
+    let run = linesman([
+        "run",
+        &path("project.toml"),
+        "--on",
+        &on,
+        "--seconds",
+        "6",
+        "--bundles",
+        &path("bundles"),
+    ]);
+    assert_eq!(run.status, 1, "{}", run.all());
+    let bundle = fs::read_dir(path("bundles")).unwrap().next().unwrap().unwrap().path();
+    assert!(contains(&members(&bundle)["project.toml"], SECRET.as_bytes()));
+    let (from, to) = (bundle.display().to_string(), path("other.zip"));
+    let run = linesman(["bundle", "anonymise", &from, "-o", &to]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    assert_eq!(found(&judged(Path::new(&to))), found(&judged(&bundle)));
+    for (name, bytes) in members(Path::new(&to)) {
+        for part in [SECRET.as_bytes(), SERIAL.to_string().as_bytes()] {
+            assert!(!contains(&bytes, part), "{name} holds {part:?}");
+        }
+    }
+}
+
+#[test]
 fn bundles_are_anonymised_as_they_are_written_and_the_same_is_found() {
     let folder = TempDir::new().unwrap();
     let plain = recorded(&folder, 2, &[]);

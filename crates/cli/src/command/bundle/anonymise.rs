@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use linesman_capture::anonymous::FrameAnonymiser;
 use linesman_config::attachment::Attachment;
-use linesman_config::project::{Project, ProjectDevice};
+use linesman_config::project::{IdentificationChoice, IdentificationWay, Project, ProjectDevice};
 use linesman_diagnosis::report::Number;
 use linesman_diagnosis::{Diagnosis, Engine};
 use linesman_runtime::bundle::{
@@ -159,6 +159,7 @@ fn anonymise(bundle: &mut Bundle) -> Result<(), Failure> {
 #[derive(Default)]
 struct NameReplacement {
     tasks: BTreeMap<String, String>,
+    groups: BTreeMap<String, String>,
     units: BTreeMap<String, String>,
     count: u64,
 }
@@ -179,7 +180,20 @@ impl NameReplacement {
         if let Some(ring) = &mut project.ring {
             attach(&devices, &mut ring.closes_at);
         }
+        // Addresses of the customer's computers; frames show none of what a gateway did with them.
+        self.count += u64::from(project.gateway.take().is_some());
+        for group in &mut project.groups {
+            group.name = renamed(&mut self.groups, &group.name, "group");
+            for name in std::iter::once(&mut group.first).chain(&mut group.members) {
+                if let Some(other) = devices.get(name) {
+                    name.clone_from(other);
+                }
+            }
+            group.places.iter_mut().for_each(|place| attach(&devices, place));
+            number(&mut group.identification, frames);
+        }
         for device in &mut project.devices {
+            number(&mut device.identification, frames);
             if let Some(name) = devices.get(&device.name) {
                 device.name.clone_from(name);
             }
@@ -187,7 +201,7 @@ impl NameReplacement {
             device.serial = device.serial.map(|serial| frames.serial(serial));
             self.device(device);
         }
-        self.count += (self.tasks.len() + self.units.len()) as u64;
+        self.count += (self.tasks.len() + self.groups.len() + self.units.len()) as u64;
     }
 
     fn device(&mut self, device: &mut ProjectDevice) {
@@ -213,6 +227,15 @@ impl NameReplacement {
     fn blank(&mut self, name: &mut String) {
         self.count += u64::from(!name.is_empty());
         name.clear();
+    }
+}
+
+/// Replaces a serial number by which a device is told from its equals.
+fn number(choice: &mut Option<IdentificationChoice>, frames: &mut FrameAnonymiser) {
+    if let Some(choice) = choice
+        && choice.by == IdentificationWay::Serial
+    {
+        choice.value = choice.value.map(|serial| frames.serial(serial));
     }
 }
 
