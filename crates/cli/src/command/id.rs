@@ -3,10 +3,12 @@
 //!
 //! Source: S0 L1161-1223; ETG.1020, explicit device identification.
 
+mod against;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use linesman_config::project::{IdentificationChoice, IdentificationWay, Project, ProjectDevice};
+use linesman_config::project::IdentificationWay;
 use linesman_maindevice::service::{Service, ServiceAnswer};
 use linesman_proto::address::DeviceId;
 use linesman_proto::register::{self, AlControl, AlStatus};
@@ -15,6 +17,7 @@ use linesman_proto::state::AlState;
 use linesman_proto::time::Span;
 use serde::Serialize;
 
+use self::against::{ComparedNumbers, compare};
 use super::service::{DeviceReport, ServiceLine};
 use super::sii;
 use crate::exit::Status;
@@ -65,6 +68,8 @@ pub(crate) struct Report {
     driven: bool,
     /// What differs from the project, each with what to do; `null` without --against.
     differences: Option<Vec<NumberDifference>>,
+    /// Numbers of the project that were not compared, each with the reason; empty without --against.
+    not_compared: Vec<String>,
 }
 
 /// The numbers that a SubDevice tells.
@@ -102,6 +107,8 @@ struct ToldNumbers {
     selector: Option<u16>,
     alias: u16,
     serial: u32,
+    /// Vendor and product code, where they are known.
+    product: Option<(u32, u32)>,
 }
 
 impl ToldNumbers {
@@ -111,6 +118,14 @@ impl ToldNumbers {
             Identification::None => None,
             Identification::AlStatus => Some("by AL control".to_owned()),
             Identification::Memory(at) => Some(format!("at 0x{:04X}", at.0)),
+        }
+    }
+
+    /// The same in words.
+    fn tells(&self, way: IdentificationWay) -> String {
+        match self.by(way) {
+            0 => format!("{} tells none", self.label),
+            number => format!("{} tells {number}", self.label),
         }
     }
 
@@ -144,33 +159,41 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     for id in ids.into_iter().filter(|id| one.is_none_or(|one| one == *id)) {
         told.push(read(&mut session, id)?);
     }
-    let wrong = project.as_ref().map(|project| compare(project, &told, one));
+    let is_driven = session.inventory().is_none();
+    let compared = project.as_ref().map(|project| compare(project, &told, one, is_driven));
     if arguments.json {
-        output.json(&report(&session, &told, wrong.as_deref()));
+        output.json(&report(&session, &told, compared.as_ref()));
     } else {
-        output.text(&table(&told, output));
+        output.text(&table(&told, is_driven, output));
         if session.inventory().is_none() {
             output.line(
                 "Another process drives this line: selectors that have to be asked for are not read.",
             );
         }
     }
-    let Some(wrong) = wrong else {
+    let Some(compared) = compared else {
         if !arguments.json {
             propose(&told, output);
         }
         return Ok(Status::Good);
     };
-    for failure in &wrong {
+    for failure in &compared.wrong {
         output.complain(failure);
     }
-    if wrong.is_empty() && !arguments.json {
-        output.line("All numbers are as planned.");
+    if !arguments.json {
+        for line in compared.not_compared() {
+            output.line(line);
+        }
+        output.line(&compared.result());
     }
-    Ok(if wrong.is_empty() { Status::Good } else { Status::Findings })
+    Ok(compared.status())
 }
 
-fn report(session: &ServiceLine, told: &[ToldNumbers], wrong: Option<&[Failure]>) -> Report {
+fn report(
+    session: &ServiceLine,
+    told: &[ToldNumbers],
+    compared: Option<&ComparedNumbers>,
+) -> Report {
     let devices = told.iter().map(|one| NumbersReport {
         device: session.report(one.id),
         read: one.read(),
@@ -187,15 +210,17 @@ fn report(session: &ServiceLine, told: &[ToldNumbers], wrong: Option<&[Failure]>
         tool: version::tool(),
         devices: devices.collect(),
         driven: session.inventory().is_none(),
-        differences: wrong.map(|wrong| wrong.iter().map(difference).collect()),
+        differences: compared.map(|all| all.wrong.iter().map(difference).collect()),
+        not_compared: compared.map(|all| all.not_compared().cloned().collect()).unwrap_or_default(),
     }
 }
 
 /// Reads the number of a SubDevice in each way.
 fn read(session: &mut ServiceLine, id: DeviceId) -> Result<ToldNumbers, Failure> {
     let known = session.known(id);
-    let serial =
-        known.and_then(|known| known.identity).map_or(0, |identity| identity.serial_number);
+    let identity = known.and_then(|known| known.identity);
+    let serial = identity.map_or(0, |identity| identity.serial_number);
+    let product = identity.map(|identity| (identity.vendor_id, identity.product_code));
     let how = session.inventory().and_then(|inventory| inventory.devices.get(id.index()));
     let how = how.map_or(Identification::None, |found| found.profile.identification);
     let word = |bytes: Option<Vec<u8>>| -> Option<u16> {
@@ -207,7 +232,7 @@ fn read(session: &mut ServiceLine, id: DeviceId) -> Result<ToldNumbers, Failure>
         Identification::AlStatus => ask(session, id)?,
     };
     let alias = word(session.try_read(id, register::STATION_ALIAS.address, 2)?).unwrap_or(0);
-    Ok(ToldNumbers { id, label: session.label(id), how, selector, alias, serial })
+    Ok(ToldNumbers { id, label: session.label(id), how, selector, alias, serial, product })
 }
 
 /// Asks for the number by bit 5 of AL control; it stands in 0x0134 while bit 5 of AL status is set (ETG.1020). The state stays
@@ -242,11 +267,12 @@ fn ask(session: &mut ServiceLine, id: DeviceId) -> Result<Option<u16>, Failure> 
     Ok(number.map(|(_, code)| code))
 }
 
-fn table(told: &[ToldNumbers], output: &Output) -> String {
+fn table(told: &[ToldNumbers], is_driven: bool, output: &Output) -> String {
     let mut table =
         Table::new(&["no", "SubDevice", "selector", "read", "alias", "serial"], output.paint());
     for one in told {
-        let how = one.read().unwrap_or_else(|| "has none".to_owned());
+        let without = if is_driven { "not read" } else { "has none" };
+        let how = one.read().unwrap_or_else(|| without.to_owned());
         let number = |value: u32| if value == 0 { "-".to_owned() } else { value.to_string() };
         table.row([
             one.id.no().to_string(),
@@ -291,78 +317,6 @@ fn propose(told: &[ToldNumbers], output: &mut Output) {
     if !lines.is_empty() {
         output.line("\nFor a project, at each [[device]] or [[group]]:");
         lines.iter().for_each(|line| output.line(&format!("  {line}")));
-    }
-}
-
-/// What differs between the numbers of a project and those that are told.
-fn compare(project: &Project, told: &[ToldNumbers], one: Option<DeviceId>) -> Vec<Failure> {
-    let Ok(tree) = project.tree() else { return Vec::new() };
-    let mut wrong = Vec::new();
-    for (node, device) in project.devices.iter().enumerate() {
-        let Some(choice) = project.identification_of(device) else { continue };
-        let Some(wanted) = choice.number(device) else { continue };
-        let place = tree.position(node).map(|place| DeviceId(place as u32));
-        if one.is_some_and(|one| place != Some(one)) {
-            continue;
-        }
-        let tellers: Vec<&ToldNumbers> =
-            told.iter().filter(|told| told.by(choice.by) == wanted).collect();
-        let here = told.iter().find(|told| Some(told.id) == place);
-        wrong.extend(difference(project, device, choice, wanted, here, &tellers));
-    }
-    wrong
-}
-
-/// What is wrong with the number of one planned SubDevice.
-fn difference(
-    project: &Project,
-    device: &ProjectDevice,
-    choice: &IdentificationChoice,
-    wanted: u32,
-    here: Option<&ToldNumbers>,
-    tellers: &[&ToldNumbers],
-) -> Option<Failure> {
-    let name = &device.name;
-    let way = match choice.by {
-        IdentificationWay::Selector => "selector",
-        IdentificationWay::Alias => "alias",
-        IdentificationWay::Serial => "serial number",
-    };
-    if tellers.len() > 1 {
-        let names: Vec<&str> = tellers.iter().map(|one| one.label.as_str()).collect();
-        return Some(Failure::new(
-            format!("{name}: its {way} {wanted} is told by {}", names.join(" and ")),
-            "give each a number of its own",
-        ));
-    }
-    // A group may be anywhere, and absent.
-    let group = project.group_of(name);
-    match (tellers, group) {
-        ([teller], None) if here.is_some_and(|here| here.id != teller.id) => Some(Failure::new(
-            format!("{name}: its {way} {wanted} is told by {}, at another place", teller.label),
-            "plug each in at its own place, or exchange their numbers",
-        )),
-        ([], Some(group)) if group.optional => None,
-        ([], _) => {
-            let found =
-                here.map_or("nobody is at its place".to_owned(), |here| match here.by(choice.by) {
-                    0 => format!("{} tells none", here.label),
-                    number => format!("{} tells {number}", here.label),
-                });
-            let advice = match choice.by {
-                IdentificationWay::Selector => {
-                    "set it at its switches or display, then off and on".to_owned()
-                }
-                IdentificationWay::Alias => {
-                    format!("`linesman id WHERE DEVICE --set {wanted}`, then off and on")
-                }
-                IdentificationWay::Serial => {
-                    "write the serial number of the new one into the project".to_owned()
-                }
-            };
-            Some(Failure::new(format!("{name}: its {way} must be {wanted}, but {found}"), advice))
-        }
-        _ => None,
     }
 }
 

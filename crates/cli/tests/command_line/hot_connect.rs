@@ -56,8 +56,13 @@ struct Machine {
 impl Machine {
     /// The project of the whole plant, with this behind it.
     fn new(more: &str) -> Self {
+        Self::of(PLANT, more)
+    }
+
+    /// The project of a plant, with this behind it.
+    fn of(plant: &str, more: &str) -> Self {
         let machine = Self { folder: TempDir::new().unwrap() };
-        machine.write("plant.toml", PLANT);
+        machine.write("plant.toml", plant);
         let saved = machine.path("saved.toml");
         let on = format!("sim:{}", machine.path("plant.toml").display());
         let run = linesman(["scan", &on, "--save", saved.to_str().unwrap()]);
@@ -140,11 +145,97 @@ fn supply_that_dips_within_a_group_that_is_there_is_a_finding() {
     let run = machine.run(&format!("{PLANT}{dip}"), &["--for", "7", "--json"]);
     let report = run.json();
     let findings = report["diagnosis"]["findings"].as_array().unwrap();
-    // Groups are numbered last: X is 6, X1 is 7.
+    // X1 is the fifth of the project, and of the line.
     let is_it =
-        |finding: &serde_json::Value| finding["code"] == "H150" && finding["place"]["no"] == 7;
+        |finding: &serde_json::Value| finding["code"] == "H150" && finding["place"]["no"] == 5;
     assert!(findings.iter().any(is_it), "{findings:#?}");
     assert_eq!(run.status, 1, "{findings:#?}");
+}
+
+#[test]
+fn fault_outside_a_group_is_told_of_the_right_subdevice_while_the_group_is_there() {
+    let machine = Machine::new(GROUP);
+    let off = "[[fault]]\nkind = \"device-off\"\ndevice = \"T2\"\nfrom_ms = 3000\n";
+    let run = machine.run(&format!("{PLANT}{off}"), &["--for", "7", "--json"]);
+    let report = run.json();
+    let findings = report["diagnosis"]["findings"].as_array().unwrap();
+    let told = |finding: &serde_json::Value| {
+        let place = &finding["place"];
+        (finding["code"].clone(), place["a"]["no"].clone(), place["b"]["no"].clone())
+    };
+    let told: Vec<_> = findings.iter().map(told).collect();
+    assert_eq!(told, [(json!("H101"), json!(6), json!(7))], "{findings:#?}");
+}
+
+/// A ring with a tool at the junction behind its first SubDevice.
+const RING: &str = r#"
+name = "ring with a tool"
+[[device]]
+name = "K1"
+type = "EK1100"
+on = "maindevice"
+[[device]]
+name = "J1"
+type = "EK1122"
+on = "K1.B"
+[[device]]
+name = "X"
+type = "EK1101"
+on = "J1.D"
+id = 5
+[[device]]
+name = "K2"
+type = "EK1100"
+on = "K1.C"
+[ring]
+closes_at = "K2.C"
+"#;
+
+#[test]
+fn healthy_ring_with_a_group_amid_the_others_has_no_findings() {
+    let machine = Machine::of(RING, &GROUP.replace("SubDevice 4", "SubDevice 3"));
+    let run = machine.run(RING, &["--for", "3"]);
+    assert_eq!(run.status, 0, "{}", run.all());
+    for said in ["the ring is closed", "hot connect group tool joined", "No findings."] {
+        assert!(run.stdout.contains(said), "{said}: {}", run.all());
+    }
+    assert!(!run.stdout.contains("confirmed"), "{}", run.all());
+}
+
+#[test]
+fn number_of_a_group_is_compared_with_those_of_its_kind() {
+    let machine = Machine::new(GROUP);
+    let project = machine.path("project.toml").display().to_string();
+    let against = |plant: &str| {
+        machine.write("now.toml", plant);
+        let on = format!("sim:{}", machine.path("now.toml").display());
+        let text = linesman(["id", &on, "--against", &project]);
+        let report = linesman(["id", &on, "--against", &project, "--json"]);
+        assert_valid(&report.json(), "numbers");
+        let count = |key: &str| report.json()[key].as_array().unwrap().len();
+        (text.status, text.all(), count("differences"), count("not_compared"))
+    };
+    let (status, said, wrong, left) = against(PLANT);
+    assert!(said.contains("All numbers are as planned."), "{said}");
+    assert_eq!((status, wrong, left), (0, 0, 0));
+    let (status, said, wrong, left) = against(&PLANT.replace("id = 5", "id = 9"));
+    assert!(
+        said.contains("its selector must be 5, which nobody tells; X (EK1101) tells 9"),
+        "{said}"
+    );
+    assert_eq!((status, wrong, left), (1, 1, 0), "{said}");
+    // It may be absent; that is no number that is right.
+    let tool = PLANT.find("[[device]]\nname = \"X\"").unwrap();
+    let behind = PLANT.find("[[device]]\nname = \"K2\"").unwrap();
+    let (status, said, wrong, left) = against(&format!("{}{}", &PLANT[..tool], &PLANT[behind..]));
+    assert!(said.contains("nobody tells its selector 5: group tool is not there"), "{said}");
+    assert_eq!((status, wrong, left), (0, 0, 1), "{said}");
+    // A project without numbers shows nothing to be right.
+    let saved = machine.path("saved.toml").display().to_string();
+    let on = format!("sim:{}", machine.path("plant.toml").display());
+    let run = linesman(["id", &on, "--against", &saved]);
+    assert_eq!(run.status, 3, "{}", run.all());
+    assert!(run.stdout.contains("Nothing was compared"), "{}", run.all());
 }
 
 #[test]
