@@ -167,8 +167,10 @@ impl Plan {
         let (device, text, advice) = match source {
             _ if self.datagrams().all(|(.., one)| one.role != Role::ClockShift) => (
                 None,
-                "another time than that of a reference clock is wanted, but no SubDevice uses its clock",
-                "give a SubDevice near the MainDevice a clock (`clock = { reference = true }`), or leave out time_source",
+                "another time than that of a reference clock is wanted (a terminal for IEEE 1588 tells one unless time_source says \
+                 otherwise), but no SubDevice uses its clock",
+                "give a SubDevice near the MainDevice a clock (`clock = { reference = true }`), or write \
+                 `time_source = \"reference-clock\"` in [network]",
             ),
             TimeSource::Device(id) if self.time_stamps.is_none() => (
                 Some(id),

@@ -135,7 +135,7 @@ pub enum ProjectError {
     },
     /// The places contradict each other.
     #[error("the wiring does not fit together: {0}")]
-    Wiring(WiringError),
+    Wiring(String),
 }
 
 impl Project {
@@ -328,7 +328,41 @@ impl Project {
                 End::MainDevice(_) => None,
             },
         };
-        Tree::from_wiring(&wired, closes_at).map_err(ProjectError::Wiring)
+        Tree::from_wiring(&wired, closes_at)
+            .map_err(|wrong| ProjectError::Wiring(self.wiring_in_words(wrong)))
+    }
+
+    /// Names for the numbers of a wiring that does not fit together.
+    fn wiring_in_words(&self, wrong: WiringError) -> String {
+        let name = |node: usize| self.devices.get(node).map_or("?", |device| device.name.as_str());
+        let end_name = |end: End| match end {
+            End::MainDevice(path) => Attachment::MainDevice(path).to_string(),
+            End::Controller(node, port) => format!("{}.{port}", name(node)),
+        };
+        match wrong {
+            WiringError::NoSuchController { .. } => wrong.to_string(),
+            WiringError::WiredTwice { end, first, second } => format!(
+                "`{}` is wired twice, to `{}` and `{}`: move one of them",
+                end_name(end),
+                name(first),
+                name(second)
+            ),
+            WiringError::OnEntry { node, port, child } => format!(
+                "device `{}` is wired to `{}.{port}`, the port where frames enter `{}`",
+                name(child),
+                name(node),
+                name(node)
+            ),
+            WiringError::Detached { node } => format!(
+                "device `{}` is not connected to the MainDevice: its wiring runs in a circle",
+                name(node)
+            ),
+            WiringError::RingTaken { node, port, taken } => format!(
+                "the ring cannot close at `{}.{port}`: `{}` is wired already",
+                name(node),
+                end_name(taken)
+            ),
+        }
     }
 
     /// The file that reads back as this project.

@@ -8,7 +8,6 @@ use linesman_config::project::{Project, ProjectDevice, ProjectError, Ring};
 use linesman_proto::port::{Port, PortMap};
 use linesman_proto::sii::Image;
 use linesman_proto::topology::wiring::ports_after;
-use linesman_proto::topology::{End, WiringError};
 
 use super::passive::Passives;
 use super::{SegmentDevice, SegmentFile, SegmentFileError};
@@ -241,7 +240,7 @@ pub(super) fn check(file: &SegmentFile, planned: &[Planned]) -> Result<(), Segme
             allowed: "0 to 2000",
         });
     }
-    wiring(file, planned).tree().map_err(|error| wiring_error(planned, error))?;
+    wiring(file, planned).tree().map_err(wiring_error)?;
     check_ports(file, planned)?;
     check_supplies(file)
 }
@@ -265,40 +264,11 @@ fn check_supplies(file: &SegmentFile) -> Result<(), SegmentFileError> {
     Ok(())
 }
 
-/// The same error with names for numbers.
-fn wiring_error(planned: &[Planned], error: ProjectError) -> SegmentFileError {
-    let name = |node: usize| planned.get(node).map_or("?", |known| known.name.as_str());
-    let end_name = |end: End| match end {
-        End::MainDevice(path) => Attachment::MainDevice(path).to_string(),
-        End::Controller(node, port) => format!("{}.{port}", name(node)),
-    };
-    let ProjectError::Wiring(wrong) = error else {
+fn wiring_error(error: ProjectError) -> SegmentFileError {
+    let ProjectError::Wiring(text) = error else {
         return SegmentFileError::Wiring(error.to_string());
     };
-    SegmentFileError::Wiring(match wrong {
-        WiringError::NoSuchController { .. } => wrong.to_string(),
-        WiringError::WiredTwice { end, first, second } => format!(
-            "`{}` is wired twice, to `{}` and `{}`: move one of them",
-            end_name(end),
-            name(first),
-            name(second)
-        ),
-        WiringError::OnEntry { node, port, child } => format!(
-            "device `{}` is wired to `{}.{port}`, the port where frames enter `{}`",
-            name(child),
-            name(node),
-            name(node)
-        ),
-        WiringError::Detached { node } => format!(
-            "device `{}` is not connected to the MainDevice: its wiring runs in a circle",
-            name(node)
-        ),
-        WiringError::RingTaken { node, port, taken } => format!(
-            "the ring cannot close at `{}.{port}`: `{}` is wired already",
-            name(node),
-            end_name(taken)
-        ),
-    })
+    SegmentFileError::Wiring(text)
 }
 
 /// The counter behind a key of the file, such as `A.lost_link`; `None` for what is none.
