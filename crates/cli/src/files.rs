@@ -1,5 +1,6 @@
 //! Files that users write: read as a whole, with messages that say which file and where.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -184,14 +185,28 @@ pub(crate) fn refuse_to_overwrite(path: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses captures that are read as one recording where one of them is no file: each is read twice.
+/// Refuses captures that are read as one recording where one of them is no file, as each is read twice, or is named twice.
 pub(crate) fn refuse_what_is_no_file(paths: &[PathBuf]) -> Result<(), Failure> {
-    let Some(path) = paths.iter().find(|path| !path.is_file()) else { return Ok(()) };
-    let reason = format!(
-        "{}: this is no file, and a recording in several parts is read from files",
-        path.display()
-    );
-    Err(Failure::new(reason, "name the files of one recording"))
+    let mut seen = BTreeSet::new();
+    for path in paths {
+        let shown = path.display();
+        let Ok(real) = path.canonicalize() else {
+            return Err(Failure::new(format!("{shown}: there is no such file"), "check the path"));
+        };
+        if !real.is_file() {
+            let reason = format!(
+                "{shown}: this is no file, and a recording in several parts is read from files"
+            );
+            return Err(Failure::new(reason, "name the files of one recording"));
+        }
+        if !seen.insert(real) {
+            return Err(Failure::new(
+                format!("{shown}: the file is named twice"),
+                "name each file once",
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Writes a text file that is not there yet.

@@ -423,6 +423,14 @@ pub(crate) fn ask_line<Q: Serialize>(
     Ok(line)
 }
 
+/// An answer that is not of the form that `who` gives; `other` has a socket, too.
+pub(crate) fn foreign_answer(who: &str, other: &str, error: &serde_json::Error) -> io::Error {
+    let text = format!(
+        "what listens there does not answer as {who} does: is it the socket of {other}? ({error})"
+    );
+    io::Error::new(io::ErrorKind::InvalidData, text)
+}
+
 /// Asks, and gives line after line until the other side ends.
 ///
 /// # Errors

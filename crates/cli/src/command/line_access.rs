@@ -35,6 +35,17 @@ pub(crate) fn refuse(names: &[String]) -> Result<(), Failure> {
     }
 }
 
+/// Refuses a name that can be nothing but a socket where none is: else it were taken for that of a network card.
+pub(crate) fn refuse_missing_socket(word: &str) -> Result<(), Failure> {
+    let path = Path::new(word);
+    if path.extension().is_none_or(|ending| ending != "sock") || path.exists() {
+        return Ok(());
+    }
+    let reason =
+        format!("{word}: there is no such socket: the run has ended, or the path is another one");
+    Err(Failure::new(reason, format!("`linesman run --on NIC --control {word}` opens one")))
+}
+
 /// Refuses what frames cannot be sent to: `word` is what was named.
 pub(crate) fn not_drivable(word: &str, selector: &Selector) -> Failure {
     let path = match selector {

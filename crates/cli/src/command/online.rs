@@ -122,6 +122,7 @@ pub(crate) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     } else if Path::new(&place).extension().is_some_and(|ending| ending == "json") {
         saved(Path::new(&place))?
     } else {
+        line_access::refuse_missing_socket(&place)?;
         match place.parse::<Selector>()? {
             Selector::Cards(names) => read_only::cards(&names, &place, arguments, output)?,
             Selector::Segment(path) => read_only::segment(&path, &place, arguments, output)?,

@@ -18,7 +18,9 @@ use serde::de::DeserializeOwned;
 pub(crate) use self::apply::apply;
 use self::message::{Answer, Faults, Request};
 pub use crate::control_socket::ControlSocketWatch;
-use crate::control_socket::{self, Asked, ControlSocket, Protocol, ask_line, ask_lines};
+use crate::control_socket::{
+    self, Asked, ControlSocket, Protocol, ask_line, ask_lines, foreign_answer,
+};
 use crate::truth_writer::TruthReader;
 
 /// The socket of a segment that runs. It is removed at the end.
@@ -90,7 +92,7 @@ pub fn ask<T: DeserializeOwned>(path: &Path, request: &Request) -> io::Result<T>
     serde_json::from_str(&line).map_err(|error| {
         // A refusal is always of the same form.
         let refusal = serde_json::from_str::<Faults>(&line).ok().and_then(|faults| faults.error);
-        refusal.map_or_else(|| error.into(), io::Error::other)
+        refusal.map_or_else(|| foreign_answer("a segment", "a run", &error), io::Error::other)
     })
 }
 

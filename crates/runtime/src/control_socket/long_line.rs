@@ -35,11 +35,11 @@ pub(super) fn read_rest(
         stream.set_read_timeout(Some(left.min(time.pause)))?;
         let came = match lines.fill_buf() {
             Ok(came) => came,
-            Err(error) => match error.kind() {
-                ErrorKind::WouldBlock | ErrorKind::TimedOut => return Ok(false),
-                ErrorKind::Interrupted => continue,
-                _ => return Err(error),
-            },
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                return Ok(false);
+            }
+            Err(error) => return Err(error),
         };
         let end = came.iter().position(|byte| *byte == b'\n');
         let len = end.map_or(came.len(), |at| at + 1);

@@ -22,7 +22,9 @@ use linesman_proto::time::Instant;
 
 use self::message::{Answer, Asked as AskedService, FileUnderWay, Request};
 pub use crate::control_socket::ControlSocketWatch;
-use crate::control_socket::{self, Asked, ControlSocket, Protocol, Requester, ask_line};
+use crate::control_socket::{
+    self, Asked, ControlSocket, Protocol, Requester, ask_line, foreign_answer,
+};
 use crate::online::{OnlineState, Rates, Snapshot};
 use crate::run::report::RunReport;
 
@@ -351,5 +353,5 @@ pub fn reset(path: &Path) -> io::Result<Answer> {
 
 fn request(path: &Path, request: &Request) -> io::Result<Answer> {
     let line = ask_line(path, request, PATIENCE)?;
-    Ok(serde_json::from_str(&line)?)
+    serde_json::from_str(&line).map_err(|error| foreign_answer("a run", "a segment", &error))
 }

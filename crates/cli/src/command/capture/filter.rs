@@ -21,7 +21,7 @@ const CHUNK: usize = 64 * 1024;
 /// What can be asked.
 #[derive(clap::Args, Debug)]
 #[command(
-    after_help = "Fields and operators are those of Wireshark: ecat.cmd == \"LRW\" && ecat.cnt < 3, ecat.len in \
+    after_help = "Fields and operators are those of Wireshark: ecat.cmd == \"LRW\" && ecat.cnt < 3, frame.len in \
                   {64..128}, !ecat_mailbox. Ours: subdevice == \"Term 4\" (number, name, type, 0x1003), register \
                   == 0x0130, cyclic, coe, foe, soe, eoe, out, back, wkc.wrong, datagram(…) for one datagram that meets it \
                   all, around(F2, 5ms) for the time around a finding. All fields: --fields."

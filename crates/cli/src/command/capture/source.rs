@@ -124,6 +124,10 @@ impl RowSource {
     /// Judges the whole capture: SubDevices and findings are known at its end.
     pub(super) fn learn(&self, output: &mut Output) -> Result<LearnedCapture, Failure> {
         let is_file = |path: &PathBuf| std::fs::metadata(path).is_ok_and(|found| found.is_file());
+        // What is not there at all is told as such.
+        if self.files.iter().any(|path| !path.exists() || path.is_dir()) {
+            self.open()?;
+        }
         if !self.files.iter().all(is_file) {
             let reason = format!(
                 "{}: SubDevices and findings are known at the end alone, and what comes through a pipe \

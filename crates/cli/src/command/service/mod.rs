@@ -152,6 +152,7 @@ impl ServiceLine {
                 inventory,
             });
         }
+        line_access::refuse_missing_socket(place)?;
         let selector: Selector = place.parse()?;
         let (client, devices, kind, inventory): (Box<dyn ServiceClient>, _, _, _) = match &selector
         {
