@@ -97,3 +97,24 @@ fn a_file_that_is_none_is_refused_with_what_it_should_be() {
     assert!(run.stderr.contains("read.toml") && run.stderr.contains("sate"), "{}", run.stderr);
     assert!(run.stderr.contains("linesman schema observations"), "{}", run.stderr);
 }
+
+#[test]
+fn what_was_not_given_is_not_said_to_be_judged() {
+    let folder = TempDir::new().unwrap();
+    let extents = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let run = linesman(["diagnose".as_ref(), path.as_os_str(), "--json".as_ref()]);
+        let diagnosis = run.json();
+        let subjects = diagnosis["coverage"]["subjects"].as_array().unwrap().clone();
+        ["states", "link-status", "wiring"].map(|subject| {
+            let found = subjects.iter().find(|one| one["subject"] == subject).unwrap();
+            found["extent"].as_str().unwrap().to_owned()
+        })
+    };
+    // One state, and no word of links; and one line of a kernel log, of no SubDevice.
+    let one_state = "[[device]]\nname = \"K1\"\non = \"maindevice\"\nstate = \"OP\"\n";
+    assert_eq!(extents("state.toml", one_state), ["judged", "not-judged", "in-part"]);
+    let timed_out = "[12.5] EtherCAT WARNING 0: 3 datagrams TIMED OUT!\n";
+    assert_eq!(extents("log.txt", timed_out), ["not-judged", "not-judged", "not-judged"]);
+}

@@ -41,10 +41,13 @@ pub(super) fn identity(basis: &Basis<'_>) -> Assessment {
 pub(super) fn wiring(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::Wiring);
     let model = basis.model;
-    if !model.tree_is_planned {
+    if model.devices.is_empty() {
+        let text = "no SubDevice was seen, so there is no wiring to compare";
+        all.lacks(Extent::NotJudged, Gap::new(Reason::NumberUnknown, text));
+    } else if !model.tree_is_planned {
         let text = "nothing says which wiring was planned";
         all.lacks(Extent::NotJudged, Gap::new(Reason::NoProject, text).step(NAME_PROJECT));
-    } else if model.devices.iter().any(|one| one.dl.first.is_none()) {
+    } else if model.devices.iter().any(|one| one.dl.first.is_none() || one.dl.is_assumed) {
         let text = "the open ports of some SubDevices were not read";
         all.lacks(Extent::InPart, Gap::new(Reason::LinkStatusNotRead, text));
     }

@@ -268,7 +268,9 @@ fn tells_links(device: &Device) -> bool {
         let track = device.counters.track(ErrorCounter::LostLink(port));
         track.is_some_and(|track| track.first.at < track.last.at)
     };
-    device.dl.latest_reading.is_some() || Port::ALL.into_iter().any(is_watched)
+    // What a person did not give was taken from the plan.
+    let is_read = device.dl.latest_reading.is_some() && !device.dl.is_assumed;
+    is_read || Port::ALL.into_iter().any(is_watched)
 }
 
 fn place(input: &LocateInput<'_>, hop: &Hop) -> Place {

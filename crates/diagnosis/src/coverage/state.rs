@@ -31,7 +31,8 @@ pub(super) fn assess(basis: &Basis<'_>) -> Assessment {
     let mut all = Assessment::judged(Subject::States);
     let unread: Vec<&Device> = model.devices.iter().filter(|one| one.al.status.is_none()).collect();
     let is_none_read = unread.len() == model.devices.len();
-    if !unread.is_empty() || model.devices.len() < model.device_count() {
+    let are_few = model.devices.is_empty() || model.devices.len() < model.device_count();
+    if !unread.is_empty() || are_few {
         let extent = if is_none_read { Extent::NotJudged } else { Extent::InPart };
         let text = if is_none_read {
             "the state of no SubDevice was read".to_owned()

@@ -8,7 +8,7 @@ use super::NetworkModel;
 /// Time without any frame that is no wait of a program, and the cycles that it lasts at least.
 const LEAST: Span = Span::ms(300);
 const LEAST_CYCLES: u64 = 50;
-/// Who ends orderly has asked SubDevices for a lower state not longer before.
+/// An orderly end asks SubDevices for a lower state, not longer before.
 const ORDERLY: Span = Span::s(1);
 
 /// Time at the end in which nothing was sent, although process data had been exchanged up to there.

@@ -62,7 +62,7 @@ mod tests {
 
     const MOST: u64 = 1000;
 
-    /// What was read of what `send` sends, and if that was in time.
+    /// Result of reading what `send` sends, and if that was in time.
     fn read(time: SendTime, send: impl FnOnce(UnixStream) + Send + 'static) -> (bool, Vec<u8>) {
         let (here, there) = UnixStream::pair().unwrap();
         let sender = thread::spawn(move || send(there));
@@ -73,7 +73,7 @@ mod tests {
         (is_whole, line)
     }
 
-    /// So long that no host holds a program up for it.
+    /// Time for which no host holds a program up.
     const LONG: Duration = Duration::from_secs(600);
 
     #[test]

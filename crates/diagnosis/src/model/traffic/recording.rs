@@ -30,7 +30,7 @@ pub struct RecordedFrames {
     last_request: Option<Instant>,
     first: Option<Instant>,
     last: Option<Instant>,
-    /// For how long the input went on behind its last frame; `None` where that is not known.
+    /// Time for which the input went on behind its last frame; `None` where that is not known.
     still: Option<Span>,
     clock_back: Span,
     longest_gap: Span,
@@ -126,7 +126,7 @@ impl RecordedFrames {
         self.last
     }
 
-    /// For how long the input is known to have gone on behind its last frame.
+    /// Time for which the input is known to have gone on behind its last frame.
     #[must_use]
     pub const fn still(&self) -> Option<Span> {
         self.still
