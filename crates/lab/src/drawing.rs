@@ -47,7 +47,11 @@ pub fn draw(tree: &Tree, labels: &[Label]) -> Vec<Row> {
         }
     }
     if let Some((node, port)) = tree.closes_at() {
-        let text = format!("ring closed: {}.{port} to the second card", pen.name(node));
+        let name = match pen.name(node) {
+            "" => format!("SubDevice {}", node + 1),
+            name => name.to_owned(),
+        };
+        let text = format!("ring closed: {name}.{port} to the second card");
         pen.rows.push(Row { text, device: None });
     }
     pen.rows
@@ -144,5 +148,7 @@ mod tests {
         let label = Label { name: "B1".to_owned(), type_name: "EP1008".to_owned() };
         let rows = draw(&tree, &[label]);
         assert_eq!(rows.last().unwrap().text, "ring closed: B1.B to the second card");
+        let rows = draw(&tree, &[]);
+        assert_eq!(rows.last().unwrap().text, "ring closed: SubDevice 1.B to the second card");
     }
 }
