@@ -194,13 +194,21 @@ fn ring_that_stays_closed_has_no_halves_and_a_line_is_none() {
 #[test]
 fn files_that_are_no_recording_together_are_refused_with_the_next_step() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("not-there.pcapng").display().to_string();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    std::fs::write(path("one.pcapng"), "").unwrap();
+    let (one, inside) = (path("one.pcapng"), folder.path().display().to_string());
     for command in
         [&["diagnose"][..], &["capture", "info"], &["capture", "list"], &["capture", "timeline"]]
     {
-        let run = linesman([command, &["--together", &path, &path]].concat());
-        assert_eq!(run.status, 2, "{}", run.all());
-        assert!(run.stderr.contains("not-there.pcapng: this is no file"), "{}", run.stderr);
+        for (other, expected) in [
+            (path("not-there.pcapng"), "not-there.pcapng: there is no such file"),
+            (inside.clone(), "this is no file"),
+            (one.clone(), "one.pcapng: the file is named twice"),
+        ] {
+            let run = linesman([command, &["--together", &one, &other]].concat());
+            assert_eq!(run.status, 2, "{}", run.all());
+            assert!(run.stderr.contains(expected), "{expected}: {}", run.stderr);
+        }
     }
     let run = linesman(["capture", "info", "before.pcapng", "after.pcapng"]);
     assert_eq!(run.status, 2, "{}", run.all());
