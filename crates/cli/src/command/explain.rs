@@ -15,6 +15,7 @@ mod number;
 mod objects;
 mod page;
 mod prefixed_number;
+mod register_bytes;
 mod registers;
 mod resolve;
 mod state_words;
@@ -209,6 +210,35 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn bytes_behind_an_address_are_told_register_by_register() {
+        let counters = [
+            "RX error counter, port A (0x0300) = 0x1200",
+            "RX error counter, port B (0x0302) = 0x0003",
+        ];
+        for line in ["0x0300: 00 12 03 00", "slave 3 0x0300: 00 12 03 00", "0x0300 00 12 03 00"] {
+            assert_eq!(titles(line)[..2], counters, "{line}");
+        }
+        assert_eq!(titles("0x0110: 37 56")[0], "DL status (0x0110) = 0x5637");
+        // Of a register that is cut off nothing is said.
+        assert_eq!(titles("0x0300: 00 12 03")[0], counters[0]);
+        assert!(!titles("0x0300: 00 12 03").iter().any(|title| title.contains("0x0302")));
+        assert!(titles("0x0134: 1b 00")[0].starts_with("AL status code 0x001B"));
+    }
+
+    #[test]
+    fn return_codes_of_ads_are_told_in_both_bases() {
+        for word in ["ADS 0x701", "ADS error 1793", "ads error code 0x0701"] {
+            assert_eq!(
+                titles(word)[0],
+                "ADS return code 0x701 (1793): service not supported",
+                "{word}"
+            );
+        }
+        let unknown = &titles("ADS 0x7FF")[0];
+        assert!(unknown.starts_with("ADS return code 0x7FF (2047): none"), "{unknown}");
     }
 
     #[test]

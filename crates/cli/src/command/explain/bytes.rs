@@ -32,18 +32,21 @@ fn hexadecimal(text: &str) -> Option<(Vec<u8>, bool)> {
     let inner = text.trim_matches(['{', '}', '[', ']', '(', ')']);
     // The text column of a dump.
     let inner = inner.split('|').next().unwrap_or_default();
-    let mut words: Vec<&str> = inner
+    let prefixed = |word: &str| word.starts_with("0x") || word.starts_with("0X");
+    let marked: Vec<&str> = inner
         .split([' ', ',', ';', ':', '-', '\t', '\n'])
         .filter(|word| !word.is_empty())
-        .map(|word| word.strip_prefix("0x").or_else(|| word.strip_prefix("0X")).unwrap_or(word))
         .collect();
+    let mut words: Vec<&str> =
+        marked.iter().map(|&word| if prefixed(word) { &word[2..] } else { word }).collect();
     // The offset in front of a dump.
     if words.len() > 2 && words[0].len() == 8 && words[1..].iter().all(|word| word.len() == 2) {
         words.remove(0);
     }
     let apart = words.len() > 1;
-    // `0x0` of a list is a byte, too.
-    let is_byte = |word: &&str| apart && word.len() == 1 || word.len().is_multiple_of(2);
+    // `0x0` of a list is a byte, too; letters alone are none.
+    let may_be_short = apart && marked.iter().all(|word| prefixed(word));
+    let is_byte = |word: &&str| may_be_short && word.len() == 1 || word.len().is_multiple_of(2);
     if words.is_empty() || !words.iter().all(is_byte) {
         return None;
     }
@@ -127,9 +130,20 @@ mod tests {
 
     #[test]
     fn what_is_no_run_of_bytes_is_none() {
-        for text in
-            ["", "…", "0x", "00E", "hello", "[1, 2, 300]", "b'", r"b'\q'", "{}", "- -", "[]"]
-        {
+        for text in [
+            "",
+            "…",
+            "0x",
+            "00E",
+            "hello",
+            "a b c",
+            "[1, 2, 300]",
+            "b'",
+            r"b'\q'",
+            "{}",
+            "- -",
+            "[]",
+        ] {
             assert_eq!(parse(text).filter(|bytes| !bytes.data.is_empty()), None, "{text}");
         }
         assert_eq!(parse(&"00".repeat(MOST + 1)), None);

@@ -1,6 +1,7 @@
 //! Pages about the numbers by which SubDevices say why: AL status codes, aborts, emergencies, errors
 //! of file transfer and of other mailbox protocols.
 
+use linesman_proto::ads::AdsCode;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::EmergencyClass;
 use linesman_proto::mailbox::coe::diagnosis::{CodeRange, text_number};
@@ -80,6 +81,15 @@ pub(super) fn soe(code: SoeError) -> Page {
         .text("The drive refuses an access to an identification number (IDN).")
         .fact("do", format!("{}.", code.action()))
         .fact("see", "ETG.1000.6, SoE; IEC 61800-7-204")
+}
+
+/// A page about a return code of ADS.
+pub(super) fn ads(code: AdsCode) -> Page {
+    let meaning = code.meaning().unwrap_or("none that a SubDevice is known to give");
+    Page::new(Kind::AdsCode, format!("ADS return code 0x{:X} ({}): {meaning}", code.0, code.0))
+        .text("Result of a request by ADS: of the service, or of the way to it.")
+        .fact("do", code.action())
+        .fact("see", "Beckhoff Information System, ADS return codes")
 }
 
 /// Tells if a number is one of the errors of SoE.

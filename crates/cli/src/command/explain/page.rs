@@ -37,6 +37,8 @@ pub(super) enum Kind {
     FoeError,
     /// A number of a refused access by SoE.
     SoeError,
+    /// A return code of ADS.
+    AdsCode,
     /// A number of a mailbox error reply.
     MailboxError,
     /// The bytes of a message: diagnosis message, emergency, mailbox message.

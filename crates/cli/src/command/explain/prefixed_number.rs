@@ -1,5 +1,6 @@
 //! Numbers with a word in front that says what they are: `AL 0x001B`, `abort 06010000`, `DL 0x5617`.
 
+use linesman_proto::ads::AdsCode;
 use linesman_proto::command::Command;
 use linesman_proto::mailbox::abort_code::SdoAbortCode;
 use linesman_proto::mailbox::coe::ObjectIndex;
@@ -28,6 +29,7 @@ enum What {
     Emergency,
     Foe,
     Soe,
+    Ads,
     Mailbox,
     Command,
     State,
@@ -90,6 +92,10 @@ const WORDS: &[(&[&str], What)] = &[
     ),
     (&["foe", "foeerror", "foeerr", "foeerrorcode"], What::Foe),
     (&["soe", "soeerror", "soeerr", "soeerrorcode"], What::Soe),
+    (
+        &["ads", "adserror", "adserr", "adserrorcode", "adscode", "adsreturncode", "adsresult"],
+        What::Ads,
+    ),
     (&["mailboxerror", "mbxerror", "mailboxerrorreply", "mailboxerrorcode"], What::Mailbox),
     (&["command", "cmd", "ecatcmd", "ecatcommand"], What::Command),
     (
@@ -234,6 +240,10 @@ fn each_base(what: What, readings: &[Number], nth: usize, found: &mut Found) {
             break;
         }
     }
+    if what == What::Ads && found.len() == before {
+        let first = readings.first().and_then(|number| number.long());
+        found.extend(85, first.map(|code| codes::ads(AdsCode(code))));
+    }
 }
 
 /// The longest run of words right in front of a number that says what it is.
@@ -306,6 +316,10 @@ fn one(what: What, number: Number, nth: usize, found: &mut Found) {
             }),
         ),
         What::Soe => found.extend(95, word.map(|code| codes::soe(SoeError(code)))),
+        What::Ads => {
+            let code = number.long().map(AdsCode);
+            found.extend(95, code.filter(|code| code.meaning().is_some()).map(codes::ads));
+        }
         What::Mailbox => {
             found.extend(95, word.map(|code| codes::mailbox(ErrorReplyCode::from_code(code))));
         }
@@ -383,10 +397,7 @@ fn value_of(address: &[Number], value: &[Number], found: &mut Found) {
     let Some(address) = hexadecimal(address).and_then(Number::word) else { return };
     let Some(value) = hexadecimal(value).or_else(|| value.first().copied()) else { return };
     if let Some(register) = bare_number::register_at(address) {
-        found.add(97, registers::value(&register, value.value));
-        let is_code = register.start() == register::AL_STATUS_CODE.address;
-        let code = value.word().filter(|_| is_code).map(AlStatusCode);
-        found.extend(98, code.map(codes::status));
+        registers::add_value(&register, value.value, 97, found);
         return;
     }
     let index = ObjectIndex(address);

@@ -2,7 +2,10 @@
 
 use linesman_proto::register::describe::decode_at;
 use linesman_proto::register::{self, Description, Field, Form, Reading, Unit};
+use linesman_proto::state::AlStatusCode;
 
+use super::codes;
+use super::found::Found;
 use super::page::{Kind, Page};
 
 /// A page about a register.
@@ -49,6 +52,14 @@ pub(super) fn value(found: &Description, value: u64) -> Page {
         .list("bits", readings(&read))
         .fact("register", entry.meaning)
         .fact("see", entry.reference)
+}
+
+/// Adds what a value of a register says; of an AL status code the code, too.
+pub(super) fn add_value(register: &Description, value: u64, likelihood: u8, found: &mut Found) {
+    found.add(likelihood, self::value(register, value));
+    if register.start() == register::AL_STATUS_CODE.address {
+        found.add(likelihood + 1, codes::status(AlStatusCode(value as u16)));
+    }
 }
 
 /// Values of fields, one line each; flags that are not set share the last line.

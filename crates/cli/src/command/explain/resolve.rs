@@ -13,7 +13,7 @@ use super::found::Found;
 use super::page::Page;
 use super::{
     bare_number, bytes, codes, commands, findings, messages, number, objects, prefixed_number,
-    registers, state_words, states, topic, vocabulary, working_counter,
+    register_bytes, registers, state_words, states, topic, vocabulary, working_counter,
 };
 
 /// Most letters that are looked at: more is no word, and no line of a log.
@@ -43,6 +43,7 @@ pub(super) fn resolve(asked: &str) -> Vec<Page> {
     }
     bare_number::add(&number::readings(&text), &mut found);
     object_entry(&text, OBJECT, &mut found);
+    register_bytes::add(&text, &mut found);
     pasted_bytes(behind_history(&text), &mut found);
     if !found.has(CERTAIN) {
         working_counter::add(&text, &mut found);
