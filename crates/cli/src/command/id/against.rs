@@ -37,7 +37,7 @@ impl ComparedNumbers {
         self.absent.iter().chain(&self.unread)
     }
 
-    /// What came out, in a line.
+    /// Result, in a line.
     pub(super) fn result(&self) -> String {
         let numbers = count(self.right as u64, "number");
         match (self.wrong.len(), self.right, self.absent.len() + self.unread.len()) {
@@ -135,7 +135,7 @@ fn way_to_set(way: IdentificationWay, wanted: u32) -> String {
     }
 }
 
-/// What is wrong with the number of one planned SubDevice.
+/// Difference of the number of one planned SubDevice, if there is one.
 fn difference(
     project: &Project,
     device: &ProjectDevice,
