@@ -19,7 +19,8 @@
 //! some tenths of a millisecond at least to carry frames again (IEEE 802.3, 24.3.4.4).
 //! A recording may show one lost request alone: once a card has lost its link, the system hands it no more frames, and none
 //! is recorded. A last request that did not come back, and nothing sent from then on until the recorder noted that it ended,
-//! is taken for that; `tcpdump -w` notes no end.
+//! is taken for that; `tcpdump -w` notes no end. Programs with ethercrab end when one request does not come back, wherever
+//! it was lost: nothing is told there, nor of a MainDevice that is not known to go on.
 //! If the card counts damaged frames meanwhile, the way round is whole and something on it spoils
 //! every frame; which link it is, no counter can be asked.
 //! In a ring the frames of card B may come round untouched while those of card A, which SubDevices process,

@@ -155,14 +155,7 @@ fn last_one_lost(script: &mut Script) -> Vec<String> {
 }
 
 #[test]
-fn last_request_that_is_lost_before_a_stillness_is_the_card_without_a_link() {
-    assert_eq!(last_one_lost(&mut running()), ["H100 link-open at link MainDevice.A - 1.A"]);
-    // Where frames were lost all along, the last one is more of the same.
-    let mut noisy = running();
-    for _ in 0..4 {
-        noisy.vanish(&[lrw(PROCESS, 4, ALL)]);
-        cycles(&mut noisy);
-    }
-    let found = last_one_lost(&mut noisy);
-    assert!(!found.iter().any(|one| one.contains("H100")), "{found:?}");
+fn last_request_that_is_lost_before_a_stillness_names_no_cable_where_the_program_may_have_ended() {
+    // Nobody knows this MainDevice: it may end when one request does not come back.
+    assert_eq!(last_one_lost(&mut running()), Vec::<String>::new());
 }

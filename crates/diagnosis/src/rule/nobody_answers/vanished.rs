@@ -8,6 +8,7 @@ use linesman_proto::topology::End;
 use super::{CERTAIN, FEW, advise, causes, first_device, first_end, restarted};
 use crate::finding::{Condition, Evidence, Symptom};
 use crate::locate::LocateInput;
+use crate::main_device::MainDeviceKind;
 use crate::model::{NetworkModel, Seen, Silence, Stillness, Tally, search};
 use crate::rule::View;
 
@@ -49,11 +50,16 @@ fn is_long(view: &View<'_>, silence: &Silence) -> bool {
 }
 
 /// The stillness behind a request that did not come back, and was the last frame of all. The system hands no frames to a card
-/// that has lost its link; of a program that was ended, the last request would have come back. Both cards of a ring lose
-/// theirs at once where one SubDevice hangs on both.
+/// that has lost its link; of a program that was ended, the last request would have come back, and only of those is it known
+/// that they go on when one did not. Both cards of a ring lose theirs at once where one SubDevice hangs on both.
 fn stillness(view: &View<'_>, silence: &Silence) -> Option<Stillness> {
     let model = view.model;
-    if silence.ended.is_some()
+    let goes_on = matches!(
+        model.main_device_kind(),
+        MainDeviceKind::Linesman | MainDeviceKind::Igh | MainDeviceKind::Twincat
+    );
+    if !goes_on
+        || silence.ended.is_some()
         || is_among_others(model, silence)
         || model.host.card(Path::A).carrier.is_some()
     {
