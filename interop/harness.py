@@ -25,7 +25,7 @@ class Skip(Exception):
 
 
 class Spoiled(AssertionError):
-    """What the host did by itself, by the check's own count, hides what the check looks for."""
+    """The host, by the check's own count, did by itself so much that it hides what the check looks for."""
 
 
 def check(function):

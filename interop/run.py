@@ -66,7 +66,7 @@ def captured(function, line):
 
 @dataclasses.dataclass
 class Attempt:
-    """How a check went once."""
+    """One run of a check."""
 
     result: str  # ok, FAIL or skip
     why: str
@@ -86,7 +86,7 @@ def told(function, attempts):
     result, why = last.result, last.why
     if all(one.is_spoiled for one in attempts):
         result, why = "skip", f"not judged, {why}"
-    whys = [f"tried again, as the host stood still for {one.excuse_ms:.0f} ms: {one.why}" for one in before]
+    whys = [f"tried again, the host stood still for {one.excuse_ms:.0f} ms at most at a time: {one.why}" for one in before]
     return "; ".join([f"{result} {function.__name__}: {why}", *whys])
 
 

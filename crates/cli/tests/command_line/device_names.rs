@@ -77,7 +77,6 @@ fn answers_call_a_subdevice_by_name_and_type() {
     assert!(!run.stdout.contains("SubDevice SubDevice"), "{}", run.stdout);
 }
 
-/// Labels say "SubDevice" where there is no name, so that nothing else has to.
 #[test]
 fn names_of_a_segment_go_to_their_subdevices_in_any_order_of_the_file() {
     let folder = TempDir::new().unwrap();
@@ -98,6 +97,7 @@ fn names_of_a_segment_go_to_their_subdevices_in_any_order_of_the_file() {
     assert!(named.stdout.contains("0x19C93052"), "{}", named.all());
 }
 
+/// Labels say "SubDevice" where there is no name, so that nothing else has to.
 #[test]
 fn no_text_says_subdevice_before_a_label() {
     fn look(folder: &Path, found: &mut Vec<String>) {

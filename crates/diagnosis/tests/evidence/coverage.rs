@@ -109,7 +109,7 @@ fn a_link_that_came_up_meanwhile_was_away_before() {
     lacks(script, "had no link at first and has one now");
 }
 
-/// What is said when the input ends `after_ms` behind the last frame.
+/// Diagnosis when the input ends `after_ms` behind the last frame.
 fn ended(script: &mut Script, after_ms: u64) -> Diagnosis {
     script.now += after_ms * 1_000_000;
     script.finish();

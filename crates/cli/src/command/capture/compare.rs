@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &Arguments, output: &mut Output) -> Result<Status, 
     let stop = line_access::stop()?;
     let one = std::slice::from_ref::<String>;
     let by_card = TapArguments::default();
-    let times = FileTimes { together: false };
+    let times = FileTimes::default();
     let before = survey(one(&arguments.before), times, &by_card, None, &stop, output)?;
     let after = survey(one(&arguments.after), times, &by_card, None, &stop, output)?;
     let diagnosis = |one: &Surveyed| one.engine.diagnosis();

@@ -25,7 +25,7 @@ use crate::text::quantity::count;
 const FRAMES_BETWEEN_LOOKS: u64 = 32_768;
 
 /// Times of several files.
-#[derive(clap::Args, Clone, Copy, Debug)]
+#[derive(clap::Args, Clone, Copy, Default, Debug)]
 pub(super) struct FileTimes {
     /// The files were recorded at the same time, as at the two cards of a ring or on the two ways of a tap: their frames
     /// are put in the order of their times, and are numbered in it
